@@ -7,13 +7,16 @@ from pathlib import Path
 import numpy as np
 import polars
 import pytest
+from matplotlib.colors import to_hex
 
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.logs.tables.parquet import write_record
 from palpate.maps.phantom import Phantom, PhantomLump, load_phantom
 from palpate.maps.presses import Presses, merge_presses
+from palpate.maps.report import SHADES, scale
 from palpate.records import Record
+from report.test_look import ALL_GROUNDS, contrast
 
 PRESS = Path(__file__).parents[2] / "examples" / "data" / "press.csv"
 COLUMNS = ["--time", "time_s", "--position", "position_mm:mm", "--force-column", "force_N:N"]
@@ -39,6 +42,30 @@ def test_a_table_is_answered_with_lumps_and_next_presses(table, capsys):
     assert "One lump is stiffer than 2000 N/m" in text
     assert "more presses bring ± 10 %" in text
     assert "next press" in text
+
+
+def test_a_lone_stiff_press_is_a_lump_or_an_outlier(table, tmp_path, capsys):
+    """Never a sure lump and a contradicted press at once."""
+    rows = table.read_text(encoding="utf-8").splitlines()
+    rows[4] = "60,60,9,0.04"  # a corner, far from the lump
+    path = tmp_path / "lone.csv"
+    path.write_text("\n".join(rows), encoding="utf-8")
+    words = ["map", "--table", str(path), "--stiffer-than", "2:kN/m"]
+    assert main([*words, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["disagreeing"] == ["row 4"]
+    assert [(lump["is_sure"], lump["unless"]) for lump in answer["lumps"]] == [(False, "row 4"), (True, "")]
+    assert main(words) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "or row 4 is an outlier: press there again" in text
+    assert "contradict" not in text
+
+
+@pytest.mark.parametrize("name", SHADES)
+def test_both_ends_of_a_scale_stand_out_on_light_and_dark_pages(name):
+    soft, stiff = (to_hex(scale(name)(fraction)) for fraction in (0.0, 1.0))
+    assert min(contrast(stiff, ground) for ground in ALL_GROUNDS) >= 3.0  # WCAG 2.2, 1.4.11
+    assert min(contrast(soft, ground) for ground in ALL_GROUNDS) >= 1.4
 
 
 def test_json_has_the_contract(table, capsys):
@@ -162,6 +189,13 @@ def test_a_phantom_is_stiff_in_its_lump_and_soft_beside_it():
     phantom = Phantom((0.04, 0.04), 1e3, 8.0, (PhantomLump((0.02, 0.02), (0.01, 0.005), 4e3),))
     at = np.array([[0.02, 0.02], [0.0, 0.0], [0.02, 0.025]])
     assert phantom.stiffness_at(at) == pytest.approx([4e3, 1e3, 2e3], rel=1e-3)
+
+
+def test_a_phantom_comes_with_palpate_by_its_name(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert load_phantom(Path("phantom")).lumps
+    Path("phantom").write_text(PHANTOM, encoding="utf-8")
+    assert len(load_phantom(Path("phantom")).lumps) == 1  # a file is the user's own
 
 
 @pytest.mark.parametrize("line", ["stiffness = -5", "colour = 3", "size = [0.04]", "stiffness = inf"])

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from palpate.errors import InputError
 from palpate.maps import StiffnessMap
@@ -161,44 +163,63 @@ def test_two_frames_are_not_mixed():
         result.update([[0.0, 0.0, 0.0]], [1e3], [10.0])
 
 
-NO_PLACES = (
-    None, "a", 3.0, [], [[]], [[0.01]], [[0.01, 0.01, 0.01]], [[np.nan, 0.01]], [[0.01, np.inf]], [[1e300, 0.0]],
-    [[0.01, 1j]], [["a", "b"]], [[0.01, None]], [[[0.01, 0.01]]], [[0.01, 0.02], [0.03]], object,
+WRONG = (
+    None, "a", 3.0, np.nan, np.inf, -np.inf, 0.0, -1.0, 1e-12, 1e12, 1e300, 10**400, True, 1j, object, [], [[]], [1.0],
+    [[0.01]], [[0.01, 1j]], [[0.01, None]], [["a", "b"]], [[[0.01, 0.01]]], [[0.01], [0.0, 0.0]], [[np.nan, 0.01]],
+    [[0.01, np.inf]], [[1e300, 0.0]],
 )  # fmt: skip
-NO_NUMBERS = (np.nan, np.inf, -np.inf, 0.0, -1.0, 1e300, "3", None, 1j, [1.0], object)
+SIZES = (1e-9, 1e-3, 1.0, 1e6, 1e11)
+PLACES = np.random.default_rng(2).uniform(-1.0, 1.0, (12, 3))
+FORMS = {
+    "scattered": PLACES,
+    "repeated": PLACES[[0, 1, 2] * 4],
+    "nearly in one line": PLACES * [1e-8, 1.0, 1.0],
+    "far from the origin": 1e3 + PLACES,
+    "two": PLACES[:2],
+    "none": PLACES[:0],
+}
 
 
-@pytest.mark.parametrize("bad", NO_PLACES, ids=repr)
-def test_what_is_no_place_is_refused_everywhere(lumpy, bad):
-    calls = [lumpy.predict, lambda v: pressed(8).update(v, [1e3], [10.0])]
-    if bad is not None:  # candidates of None are a grid
-        calls.append(lambda v: lumpy.next(1, v))
-    for call in calls:
-        with pytest.raises(InputError) as error:
-            call(bad)
-        assert "\n" not in str(error.value)
+@pytest.mark.parametrize("form", FORMS)
+@given(st.data())
+def test_any_call_gives_finite_numbers_or_one_line(form, data):
+    """Presses of any place, size and interval, then each public call with numbers, text, arrays and nothing."""
+    draw = lambda *right: data.draw(st.sampled_from([*right] * 60 + [*WRONG]))  # noqa: E731
+    size, value, half = (data.draw(st.sampled_from(SIZES)) for _ in range(3))
+    places = size * FORMS[form][:, : data.draw(st.sampled_from([2, 3]))]
+    count = len(places)
+    stiffness = value * np.exp(data.draw(st.sampled_from([0.0, 0.1, 2.0])) * PLACES[:count, 0])
+    result = answer(lambda: StiffnessMap(draw(0.0, 0.1))) or StiffnessMap()
+    answer(lambda: result.update(places, stiffness, half * stiffness, draw(None, np.arange(count) // 3)))
+    answer(lambda: result.update(draw(places), draw(stiffness), draw(half * stiffness)))
+    there = draw(1.5 * places - 0.5 * places[:1], np.full_like(places, np.nan))
+    prediction = answer(lambda: result.predict(there))
+    if prediction is not None:
+        assert_finite(
+            *(getattr(prediction, name) for name in ("stiffness", "ci95", "next95", "relative_half"))
+        )
+        assert_finite(answer(lambda: prediction.exceeds(draw(value))))
+    chosen = answer(lambda: result.next(draw(1, 2, 3), draw(None, there), stiffer_than=draw(None, value)))
+    if chosen is not None:
+        assert_finite(chosen.places, chosen.expected_half)
+    grid = answer(lambda: result.grid(draw(1, 100)))
+    assert_finite(None if grid is None else grid.places)
+    assert_finite(answer(lambda: result.presses_until(draw(0.1))), answer(result.disagreeing))
 
 
-@pytest.mark.parametrize("bad", NO_NUMBERS, ids=repr)
-def test_what_is_no_number_of_its_range_is_refused_everywhere(lumpy, bad):
-    calls = {
-        "count": lumpy.next,
-        "grid": lumpy.grid,
-        "until": lumpy.presses_until,
-        "above": lumpy.predict(CORNERS).exceeds,
-        "edge": lambda v: lumpy.next(stiffer_than=v),
-    }
-    if bad is None:
-        del calls["edge"]  # no threshold
-    for call in calls.values():
-        with pytest.raises(InputError):
-            call(bad)
-    if bad != 0.0:
-        with pytest.raises(InputError):
-            StiffnessMap(bad)
-    for wrong in ([[bad]], bad if np.ndim(bad) == 0 else [bad]):
-        with pytest.raises(InputError):
-            StiffnessMap().update([[0.0, 0.0]], wrong, [1.0])
+def answer(call):
+    """The result of a call, or None if it is refused in one line."""
+    try:
+        return call()
+    except InputError as error:
+        lines = str(error).splitlines()
+    assert len(lines) == 1
+    return None
+
+
+def assert_finite(*numbers):
+    for array in numbers:
+        assert array is None or np.isfinite(array).all()
 
 
 def test_a_map_without_presses_answers_in_one_line():

@@ -12,7 +12,8 @@ from scipy.spatial import cKDTree
 from oracles.wiped_surface import Wipe, WipeLog, any_press, any_wipe, press, wipe
 from palpate.cli import main
 from palpate.contact_frame import ContactFrame, identify_contact
-from palpate.contact_frame.slide_log import RELAXATION_SPREAD
+from palpate.contact_frame.signals_in_base import base_signals
+from palpate.contact_frame.slide_log import RELAXATION_SPREAD, compensate_slide
 from palpate.identification import Identification, Verdict
 from palpate.records import Record
 
@@ -34,6 +35,57 @@ def cone_held(found: Identification, log: WipeLog) -> float:
     true = log.normal[log.inside][cKDTree(log.place[log.inside]).query(at)[1]]
     off = np.arccos(np.clip(np.einsum("ij,ij->i", [p["normal"] for p in places], true), -1.0, 1.0))
     return float(np.mean(np.degrees(off) < [p["cone95_deg"] for p in places]))
+
+
+def slope(tilt: float, along: np.ndarray) -> Record:
+    """A tip that comes straight down on a plane tilted by an angle about y [rad], and slides with friction 0.3."""
+    rng = np.random.default_rng(3)
+    time = np.arange(0.0, 8.0, 0.004)
+    normal = np.array([np.sin(tilt), 0.0, -np.cos(tilt)])
+    pressed = np.clip((time - 1.5) / 0.3, 0.0, 1.0)
+    path = 0.03 * np.maximum(time - 1.9, 0.0)
+    size = 15.0 * pressed * (1.0 + 0.02 * np.sin(4.0 * time))
+    force = -np.outer(size, normal) - np.outer(0.3 * size * (1.0 - np.exp(-path / 2e-4)), along)
+    place = np.outer(0.01 * np.maximum(1.5 - time, 0.0), [0.0, 0.0, 1.0])
+    place += np.outer(size / 2e4, normal) + np.outer(path, along)
+    columns = {"time": time} | {
+        f"quaternion_{axis}": np.full(len(time), float(axis == "w")) for axis in "wxyz"
+    }
+    for name, values, noise in (
+        ("force", force + np.array([0.7, -0.4, 1.1]), 0.1),
+        ("position", place, 5e-6),
+    ):
+        noisy = values + noise * rng.normal(size=values.shape)
+        columns |= {f"{name}_{axis}": noisy[:, i] for i, axis in enumerate("xyz")}
+    return Record(columns, {name: UNITS[name.partition("_")[0]] for name in columns}, {})
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_uphill_is_as_downhill(way):
+    up = np.array([np.cos(np.radians(35.0)), 0.0, np.sin(np.radians(35.0))])
+    record = slope(np.radians(35.0), way * up)
+    mu = identify_contact(record, ContactFrame(wrench_frame="tool"))[0].parameters["mu"]
+    assert mu.verdict is Verdict.IDENTIFIED
+    assert mu.ci95[0] < 0.3 < mu.ci95[1]
+
+
+def test_free_motion_is_taken_where_it_is_given():
+    frame = ContactFrame(wrench_frame="tool", free=(0.2, 0.9))
+    signals = base_signals(slope(0.0, np.array([1.0, 0.0, 0.0])), frame)
+    free = signals.time[compensate_slide(signals, frame).free]
+    assert (free[0], free[-1]) == pytest.approx((0.2, 0.9), abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("world", "sentence"),
+    [
+        ({"seed": 20019, "free": 0.0}, "The tip slides; its friction needs the force's zero"),
+        ({"seed": 20001, "free": 1.5, "turns": False}, "The tip slides: mu is at most "),
+    ],
+)
+def test_a_slide_is_named_by_its_evidence_alone(world, sentence):
+    """Without the force's zero, and of a contact that hardly slips in full."""
+    assert found_in(wipe(any_wipe(**world))).slide.sentence.startswith(sentence)
 
 
 @pytest.mark.parametrize("action", [True, pytest.param(False, marks=pytest.mark.long)])

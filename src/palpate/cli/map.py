@@ -223,7 +223,7 @@ def press_map(press: AskOptions, simulated: SimulatedOptions, phantom: PhantomOp
     if phantom.page is not None:
         check_place(phantom.page, "--page", ending=".html")
     surface = load_phantom(phantom.map)
-    title = f"Phantom {phantom.map.stem}, {' × '.join(plain(1e3 * side, 3) for side in surface.size)} mm"
+    title = f"Map of {phantom.map.stem}, {' × '.join(plain(1e3 * side, 3) for side in surface.size)} mm"
     request = MapOptions(stiffer_than=phantom.stiffer_than).request()
     spec = simulated.spec(press, KelvinVoigt(surface.stiffness, surface.damping, 0.0))
     folder = simulated.out if simulated.out is not None else Path("runs") / f"map-{phantom.map.stem}"

@@ -48,7 +48,7 @@ def press(
 
     It maps a phantom, a surface with lumps, by presses at places that it chooses itself:
 
-    palpate press --arm ur5e --force 5:N --map phantom.toml --presses 40 --stiffer-than 2:kN/m --out runs/map
+    palpate press --arm ur5e --force 5:N --map phantom --presses 40 --stiffer-than 2:kN/m --out runs/map
 
     For a real arm, --dry-run reads the arm, prints the planned motion and moves nothing:
 

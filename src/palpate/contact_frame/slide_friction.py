@@ -33,8 +33,8 @@ from palpate.units import cone95
 
 UNKNOWN_WEIGHT_STD = 20.0
 """Standard deviation of an unknown weight [N]: robots carry tools of some kilograms."""
-SPEED_FALSE_ALARM = 1e-3
-"""Probability at which a dependence on speed is ascribed to chance."""
+FALSE_ALARM = 1e-3
+"""Probability at which a dependence on speed, or a slide of a contact that hardly slips, is ascribed to chance."""
 MAX_PUSHING_FRACTION = 0.05
 """Fraction of the windows in which friction may seem to push, against its noise."""
 MAX_NORMAL_ANGLE = np.radians(30.0)
@@ -84,6 +84,7 @@ def slide_in(
     windows = None if compensated is None else slide_windows(signals, compensated, frame)
     claims = press.parameters["K"].verdict is Verdict.IDENTIFIED
     retried = compensated is not None and windows is None and compensated.free.any() and claims
+    retried = retried and frame.free is None
     if retried:  # what looks like free motion may be a slide, and its touch friction that begins
         compensated = compensate_slide(signals, frame, touches=False)
         windows = None if compensated is None else slide_windows(signals, compensated, frame)
@@ -96,14 +97,19 @@ def slide_in(
     if better < (certain if retried else -certain):
         return None
     slide = None
-    if (fitted[1].slips or not windows.load_known) and not retried and (better > certain or not claims):
+    from scipy.special import stdtrit
+
+    # A contact that never slips in full is named a slide against far better evidence alone.
+    surely = better > (
+        certain if fitted[1].slips or not windows.load_known else stdtrit(BLOCKS - 1, 1.0 - FALSE_ALARM)
+    )
+    if not retried and (surely or (fitted[1].slips and not claims)):
         slide = _identification(signals, frame, arm, (tolerance, calibration), compensated, windows, fitted)
     if claims:
         return slide or replace(
             press, parameters=press.parameters | {"K": _press_or_slide(press.parameters["K"])}
         )
-    mu = None if slide is None else slide.parameters["mu"]
-    significant = mu is not None and (mu.value is not None or (mu.ci95 is not None and better > certain))
+    significant = slide is not None and (surely or slide.parameters["mu"].value is not None)
     return slide if significant or Code.NO_CONTACT.word in press.codes else None
 
 
@@ -315,7 +321,7 @@ def _depends_on_speed(by_class: SlideFit, count: int) -> bool:
     step = D @ by_class.mu
     C = D @ by_class.covariance[:count, :count] @ D.T
     wald = float(step @ np.linalg.solve(C, step)) / (count - 1)
-    return not fdtrc(count - 1, BLOCKS - count, wald) > SPEED_FALSE_ALARM
+    return not fdtrc(count - 1, BLOCKS - count, wald) > FALSE_ALARM
 
 
 def _verdict(mu: Coefficient, wrong: str, load_known: bool, tolerance: float) -> Parameter:
@@ -532,6 +538,8 @@ def _answer(
     wide = cone95(float(np.median(cone)))
     if friction.value is None and friction.ci95 is not None:
         first = f"The tip slides: mu is at most {friction.ci95[1]:.3g}."
+    elif friction.reason == _NO_ZERO:
+        first = f"The tip slides; its friction needs the force's zero: {_NO_ZERO}."
     elif friction.value is None:
         why = friction.reason if friction.reason.endswith("?") else f"{friction.reason}."
         first = f"The tip slides, but the log does not give its friction: {why}"

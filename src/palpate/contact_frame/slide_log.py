@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from palpate.arrays import Array, Indices, Mask
-from palpate.contact_frame.free_motion import MIN_ROWS
+from palpate.contact_frame.free_motion import MIN_ROWS, rows_between
 from palpate.contact_frame.load import fit_load, fit_load_robustly, load_with_payload, zero_load
 from palpate.contact_frame.signals_in_base import BaseSignals, CompensatedForce, ContactFrame
 from palpate.identification.options import USUAL_LAG, USUAL_LAG_STD
@@ -195,10 +195,13 @@ def compensate_slide(
         return None
     free = np.zeros(len(means.rows), bool)
     if touches:
-        free |= _free_before_touch(means)
-        free[::-1] |= _free_before_touch(means.reversed())
+        free = _free_on_both_sides(means)
     weighs = not frame.gravity_compensated
-    free_rows = _untouched_rows(signals, means, free, weighs)
+    if frame.free is None:
+        free_rows = _untouched_rows(signals, means, free, weighs)
+    else:
+        free_rows = rows_between(signals.time, frame.free) & finite
+        free = free_rows[means.rows]
     force = signals.force[free_rows]
     rotations = signals.rotations[free_rows]
     if frame.payload is not None:
@@ -213,8 +216,29 @@ def compensate_slide(
     return CompensatedForce(load.taken_off(signals.force, signals.rotations), finite, inside, free_rows, load)
 
 
+def _free_on_both_sides(means: _MovingMeans) -> Mask:
+    """Means before the first touch and after the last.
+
+    Where one of them would be in contact by the other's level of the force, the steadier one is free: the other slides.
+    """
+    before, after = _free_before_touch(means), _free_before_touch(means.reversed())[::-1]
+    if not (before.any() and after.any()):
+        return before | after
+    levels = [np.median(means.force[rows], axis=0) for rows in (before, after)]
+    largest = np.linalg.norm(means.force - levels[0], axis=1).max()
+    if np.linalg.norm(levels[1] - levels[0]) < 0.5 * largest:
+        return before | after
+    scatter = [
+        np.abs(means.force[rows] - level).mean() for rows, level in zip((before, after), levels, strict=True)
+    ]
+    return before if scatter[0] < scatter[1] else after
+
+
 def _free_before_touch(means: _MovingMeans) -> Mask:
-    """Means before the first touch; none if the approach is not along the force that it meets."""
+    """Means before the first touch; none if the approach is not along the force that it meets.
+
+    Of a tip that slides at once, up a slope or down, the approach is along the force less its part along the slide.
+    """
     brief = means.brief
     none = np.zeros(len(means.rows), bool)
     level = np.median(means.force[:brief], axis=0)
@@ -230,15 +254,22 @@ def _free_before_touch(means: _MovingMeans) -> Mask:
     contact_force = means.rotations[met] @ (np.median(means.force[met:later], axis=0) - level)
     approach = position[end] - position[end - brief]
     departure = position[min(met + brief, len(position) - 1)] - position[met]
-    product = float(np.linalg.norm(approach) * np.linalg.norm(contact_force))
-    is_along = abs(approach @ contact_force) > MIN_APPROACH_COSINE * product
+    slide = position[min(later, len(position) - 1)] - position[met]
+    across = contact_force - slide * (contact_force @ slide) / max(slide @ slide, 1e-300)
+    leaves_across = np.linalg.norm(across) > MIN_SLIDE_SINE * np.linalg.norm(contact_force)
+    is_along = _is_along(approach, contact_force)
     # The force comes on a shorter way than it stayed away on, and the tip does not turn back, as friction would.
     free_path = float(np.linalg.norm(position[: end + 1] - position[end], axis=1).max())
     is_sudden = free_path > max(MIN_SLIDE, float(np.linalg.norm(position[met] - position[end])))
     goes_on = approach @ departure > -0.5 * (approach @ approach)
-    if not (is_along and is_sudden and goes_on):
+    if not is_sudden or not ((is_along and goes_on) or (leaves_across and _is_along(approach, across))):
         return none
     return np.arange(len(means.rows)) < end - means.window
+
+
+def _is_along(direction: Array, force: Array) -> bool:
+    product = float(np.linalg.norm(direction) * np.linalg.norm(force))
+    return bool(abs(direction @ force) > MIN_APPROACH_COSINE * product)
 
 
 def _untouched_rows(signals: BaseSignals, means: _MovingMeans, free: Mask, weighs: bool) -> Mask:

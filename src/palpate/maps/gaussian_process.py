@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_solve, cholesky, eigh, solve_triangular
-from scipy.linalg.lapack import dpotri
+from scipy.linalg import LinAlgError, cholesky, eigh
+from scipy.linalg.lapack import dtrtri
 from scipy.optimize import brentq, minimize
 from scipy.spatial.distance import cdist, pdist, squareform
 from scipy.stats import invgamma, norm
@@ -28,10 +28,12 @@ ROUGH = 3.0**0.5
 BLOCK = 300
 """Presses of one likelihood: of more, random blocks are independent (composite likelihood), so that time is linear."""
 CHUNK = 16_000
-"""Covariances in one part of a prediction: they fit in a processor's cache."""
+"""Covariances in one part of a prediction: they fit in a processor's cache, see `benchmarks/maps/coverage.py`."""
 PRODUCT = 500_000
 """Multiplications in one matrix product: so few that BLAS starts no threads, which on a busy machine wait for each
 other a hundred times longer than they compute."""
+SMALL = 32
+"""Half of the rows of a matrix that LAPACK factors at once: its threads start at 64."""
 LEVEL = 0.05
 """Fraction of values outside their intervals."""
 Z95 = float(norm.isf(LEVEL / 2.0))
@@ -106,18 +108,18 @@ class Conditioned:
     line: Array | None = None
 
     @cached_property
-    def factor(self) -> Array:
-        """Lower Cholesky factor of the values' covariance (n, n)."""
+    def whitening(self) -> Array:
+        """Inverse of the lower Cholesky factor of the values' covariance (n, n)."""
         K = self.parameters.covariance(cdist(self.places, self.places))
         K[np.diag_indices_from(K)] += self.noise**2 + self.parameters.repeat**2
         if self.line is not None:
             K += self.parameters.shared**2 * (self.line[:, None] == self.line)
-        return cholesky(K, lower=True, check_finite=False)
+        return whiten(K)
 
     @cached_property
     def reduction(self) -> Reduction:
         """Linear rows over the values that give the field elsewhere."""
-        W = solve_triangular(self.factor, np.eye(len(self.values)), lower=True, check_finite=False)
+        W = self.whitening
         ones = W.sum(axis=1)
         unknown = 1.0 / float(np.linalg.norm(ones))
         level = unknown**2 * float(ones @ (W @ self.values))
@@ -137,7 +139,7 @@ class Conditioned:
 
     def leave_one_out(self) -> tuple[Array, Array]:
         """Deviation of each value from the prediction of the others, and its variance, (n,) each (section 5.4.2)."""
-        inverse = cho_solve((self.factor, True), np.eye(len(self.values)), check_finite=False)
+        inverse = _product(self.whitening.T, self.whitening)
         w = inverse.sum(axis=0)
         inverse -= np.outer(w, w) / w.sum()
         variance = 1.0 / np.diag(inverse)
@@ -166,19 +168,36 @@ class Reduction:
     def predict(self, distance: Array) -> tuple[Array, Array]:
         """Mean and variance (..., m) of the field at distances (n, m) [m] from the values' places (eq. 2.42)."""
         k = self.parameters.covariance(distance.astype(self.rows.dtype))
-        half = len(distance) // 2
-        upper = self.rows[..., :half, :half] @ k[..., :half, :]  # the inverse of the factor is triangular
-        lower = self.rows[..., half:, :] @ k
-        explained = (np.einsum("...ij,...ij->...j", part, part) for part in (upper, lower[..., :-2, :]))
-        level_error = self.unknown - lower[..., -1, :]
-        variance = self.prior - sum(explained) + level_error**2
-        return self.level + lower[..., -2, :], np.maximum(variance, 0.0)
+        n, m = distance.shape
+        height = max(PRODUCT // (n * max(m, 1)), 1)
+        variance = self.prior
+        for first in range(0, n, height):  # bands of rows: the inverse of the factor is triangular
+            last = min(first + height, n)
+            explained = self.rows[..., first:last, :last] @ k[..., :last, :]
+            variance = variance - np.einsum("...ij,...ij->...j", explained, explained)
+        rise, level = np.moveaxis(self.rows[..., n:, :] @ k, -2, 0)
+        return self.level + rise, np.maximum(variance + (self.unknown - level) ** 2, 0.0)
 
 
 def _product(rows: Array, right: Array) -> Array:
     """The product of two matrices by parts of the left one's rows, each so small that BLAS starts no threads."""
-    parts = np.array_split(rows, max(rows.size * right.shape[1] // PRODUCT, 1))
-    return np.concatenate([part @ right for part in parts])
+    height = max(PRODUCT // max(right.size, 1), 1)
+    return np.concatenate([rows[first : first + height] @ right for first in range(0, len(rows), height)])
+
+
+def whiten(covariance: Array) -> Array:
+    """Inverse of the lower Cholesky factor (n, n), by halves so small that LAPACK starts no threads, see `PRODUCT`.
+
+    Raises:
+        LinAlgError: the covariance is not positive definite.
+    """
+    half = len(covariance) // 2
+    if half < SMALL:
+        return np.asarray(dtrtri(cholesky(covariance, lower=True, check_finite=False), lower=1)[0])
+    upper = whiten(covariance[:half, :half])
+    beside = _product(covariance[half:, :half], upper.T)
+    lower = whiten(covariance[half:, half:] - _product(beside, beside.T))
+    return np.block([[upper, np.zeros_like(beside.T)], [-_product(lower, _product(beside, upper)), lower]])
 
 
 @dataclass(frozen=True)
@@ -236,9 +255,8 @@ def loss(
         slopes.append(2.0 * p.shared**2 * same)
     K = squareform(covariance)
     K[np.diag_indices_from(K)] = p.variance + noise**2 + p.repeat**2 + p.shared**2
-    factor = cholesky(K, lower=True, check_finite=False)
-    P, _ = dpotri(factor, lower=1)  # starts no threads for 100 presses, nor do the sums below
-    P += np.tril(P, -1).T
+    W = whiten(K)
+    P = _product(W.T, W)
     w = P.sum(axis=0)
     P -= np.outer(w, w) / w.sum()
     a = np.einsum("ij,j", P, values)
@@ -248,7 +266,7 @@ def loss(
     gradient.insert(4, 0.0)  # the repetition adds no covariance between different values
     variances = np.array([p.smooth**2, 0.0, p.rough**2, 0.0, p.repeat**2, p.shared**2])
     diagonal = np.trace(G) * variances
-    value = 0.5 * values @ a + np.log(np.diag(factor)).sum() + 0.5 * np.log(w.sum())
+    value = 0.5 * values @ a - np.log(np.diag(W)).sum() + 0.5 * np.log(w.sum())
     return float(value), np.array(gradient) + diagonal[: len(gradient)]
 
 
@@ -333,8 +351,7 @@ class GaussianProcess:
             mean = self.weights @ means
             return np.array([mean, self.weights @ (variances + (means - mean) ** 2)])
 
-        n = len(self.likeliest.values)
-        size = max(min(CHUNK // n, PRODUCT // n**2), 16)
+        size = max(CHUNK // len(self.likeliest.values), 16)
         parts = [places[first : first + size] for first in range(0, len(places), size)]
         mean, variance = np.concatenate([np.empty((2, 0)), *map(moments, parts)], axis=1)
         return mean, variance

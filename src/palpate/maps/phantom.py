@@ -68,13 +68,15 @@ class Phantom(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def load_phantom(path: Path) -> Phantom:
-    """A phantom from a TOML file.
+    """A phantom from a TOML file, or one that comes with palpate by its name.
 
     Raises:
         InputError: it cannot be read, or a number is not above zero.
     """
     advice = "; a phantom has size, stiffness, damping and [[lumps]] with at, radius, stiffness, edge"
-    phantom = read_table(read_text(path, "a phantom"), str(path), Phantom, lambda _: advice)
+    shipped = Path(__file__).with_name("phantoms") / f"{path.name}.toml"
+    source = shipped if shipped.is_file() and not path.exists() else path
+    phantom = read_table(read_text(source, "a phantom"), str(path), Phantom, lambda _: advice)
     numbers = [*phantom.size, phantom.stiffness]
     for lump in phantom.lumps:
         numbers += [*lump.radius, lump.stiffness, lump.edge]

@@ -24,7 +24,11 @@ from palpate.units import plain, quantity, quantity_between
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colorbar import Colorbar
+    from matplotlib.colors import ListedColormap
     from matplotlib.figure import Figure
+
+SHADES = {"Blues": (0.3, 0.75), "Greys": (0.3, 0.65)}
+"""Fraction of matplotlib's scales of colours between which a map's are."""
 
 
 def sentence(result: MapResult) -> str:
@@ -41,13 +45,19 @@ def sentence(result: MapResult) -> str:
         )
     sure = [lump for lump in result.lumps if lump.is_sure]
     than = quantity(threshold, "N/m")
-    unsure = len(result.lumps) - len(sure)
+    alone = [lump for lump in result.lumps if lump.unless]
+    unsure = len(result.lumps) - len(sure) - len(alone)
+    either = "".join(
+        f" At {place(lump.place)} is a lump of {_stiffness(lump.stiffness)}, or {lump.unless} is an outlier: "
+        "press there again."
+        for lump in alone[:3]
+    )
     if not sure:
         maybe = f"; {unsure} {'place' if unsure == 1 else 'places'} may be" if unsure else ""
-        return f"Nothing is surely stiffer than {than}{maybe}."
+        return f"Nothing is surely stiffer than {than}{maybe}.{either}"
     listed = ", ".join(f"{_stiffness(lump.stiffness)} at {place(lump.place)}" for lump in sure[:3])
     count = "One lump is" if len(sure) == 1 else f"{len(sure)} lumps are"
-    return f"{count} stiffer than {than}: {listed}{', ...' if len(sure) > 3 else ''}."
+    return f"{count} stiffer than {than}: {listed}{', ...' if len(sure) > 3 else ''}.{either}"
 
 
 def _stiffness(value: float) -> str:
@@ -66,9 +76,12 @@ def warnings(result: MapResult) -> list[str]:
     if result.presses.refused:
         name, why = next(iter(result.presses.refused.items()))
         lines.append(f"{len(result.presses.refused)} logs give no press; {name}: {why}")
-    if wrong := result.map.disagreeing():
-        named = ", ".join(result.presses.names[i] for i in wrong[:5])
-        lines.append(f"their neighbours contradict {named}: press there again")
+    alone = {lump.unless for lump in result.lumps}
+    names = (result.presses.names[i] for i in result.map.disagreeing())
+    if wrong := [name for name in names if name not in alone]:
+        lines.append(
+            f"outliers, or places of their own: neighbours contradict {', '.join(wrong[:5])}; press there again"
+        )
     unequal = len(np.unique(result.map.places, axis=0)) == len(result.map)
     if unequal and result.repeat > np.median(result.map.half / result.map.stiffness):
         lines.append(
@@ -99,7 +112,7 @@ def tables(result: MapResult) -> list[Table]:
                 place(at.place),
                 quantity_between(*at.ci95, "N/m"),
                 _area(at),
-                "yes" if at.is_sure else "perhaps",
+                "yes" if at.is_sure else f"unless {at.unless} is an outlier" if at.unless else "perhaps",
             )
             for at in result.lumps
         ]
@@ -163,7 +176,7 @@ def _cards(result: MapResult) -> list[Card]:
         Card(
             f"Lump {k + 1}", _short(lump.stiffness, 3), "N/m", _short(0.5 * (lump.ci95[1] - lump.ci95[0])),
             f"at {place(lump.place)}; {_area(lump)}", "ok" if lump.is_sure else "warn",
-            "stiffer" if lump.is_sure else "perhaps", "K",
+            "stiffer" if lump.is_sure else "or an outlier" if lump.unless else "perhaps", "K",
         )
         for k, lump in enumerate(result.lumps[:3])
     ]  # fmt: skip
@@ -192,9 +205,9 @@ def _area(lump: Lump) -> str:
 def _map_caption(result: MapResult) -> str:
     threshold = result.request.stiffer_than
     lines = "" if threshold is None else (
-        f" Line: {quantity(threshold, 'N/m')}; dashed: its 95 % band, place by place."
+        f" Line: {quantity(threshold, 'N/m')}; dotted: its 95 % band, place by place."
     )  # fmt: skip
-    return f"Stiffness [N/m]. Rings: presses.{lines}"
+    return f"Stiffness [N/m]. Rings: presses. Dashes: the cut. Hatched: not known.{lines}"
 
 
 def _press_rows(result: MapResult) -> list[tuple[str, str, str]]:
@@ -213,9 +226,7 @@ def draw_map(result: MapResult) -> Figure:
     grid = result.grid
     threshold = result.request.stiffer_than
     with style.ink(9.0):
-        figure, axis, bar = _picture(
-            result, prediction.stiffness, "stiffness [N/m]", "Blues_r", norm=LogNorm()
-        )
+        figure, axis, bar = _picture(result, prediction.stiffness, "stiffness [N/m]", "Blues", norm=LogNorm())
         low, high = bar.ax.get_xlim()
         if high < 8.0 * low:
             bar.ax.xaxis.set_major_locator(MaxNLocator(5, steps=(1, 2, 5, 10)))
@@ -224,12 +235,12 @@ def draw_map(result: MapResult) -> Figure:
         bar.ax.xaxis.set_minor_formatter(NullFormatter())
         if threshold is not None:
             probability = np.where(grid.inside, prediction.exceeds(threshold), np.nan).reshape(grid.shape)
-            axis.contour(1e3 * grid.across, 1e3 * grid.along, probability, [0.025, 0.5, 0.975], colors="white",
-                         linewidths=[0.9, 1.8, 0.9], linestyles=["--", "-", "--"])  # fmt: skip
+            axis.contour(1e3 * grid.across, 1e3 * grid.along, probability, [0.025, 0.5, 0.975], colors="black",
+                         linewidths=[0.9, 1.8, 0.9], linestyles=[":", "-", ":"])  # fmt: skip
         at = 1e3 * result.map.surface.coordinates(result.map.places)
         axis.plot(*at.T, "o", mfc="white", mec="black", markersize=4, mew=0.9, clip_on=False)
         begin, end = (1e3 * point for point in _cut_ends(result))
-        axis.plot(*zip(begin, end, strict=True), color="white", linewidth=0.9, linestyle=(0, (5, 4)))
+        axis.plot(*zip(begin, end, strict=True), c="black", linewidth=0.9, linestyle=(0, (5, 4)))
     return figure
 
 
@@ -237,7 +248,7 @@ def draw_interval(result: MapResult) -> Figure:
     """The half-width of the interval over the surface, and the next presses by their numbers."""
     half = 100.0 * result.prediction.relative_half
     with style.ink(9.0):
-        figure, axis, _ = _picture(result, half, "half-width, 95 % [%]", "Greys_r")
+        figure, axis, _ = _picture(result, half, "half-width, 95 % [%]", "Greys")
         coordinates = 1e3 * result.map.surface.coordinates(result.next.places[: result.request.next])
         for k, (x, y) in enumerate(coordinates):
             box = {"boxstyle": "circle,pad=0.25", "fc": style.CARD, "ec": style.INK, "lw": 0.9}
@@ -252,14 +263,27 @@ def _picture(
     grid = result.grid
     figure, (axis,) = style.grid((5.0, 4.4))
     image_values = np.where(grid.inside, values, np.nan).reshape(grid.shape)
-    appearance = {"origin": "lower", "cmap": colours, "interpolation": "bilinear", **norm}
-    image = axis.imshow(image_values, extent=tuple(1e3 * grid.ends), **appearance)
+    extent = tuple(1e3 * grid.ends)
+    appearance = {"origin": "lower", "cmap": scale(colours), "interpolation": "bilinear", **norm}
+    image = axis.imshow(image_values, extent=extent, **appearance)
+    axis.axhspan(*axis.get_ylim(), fill=False, hatch="////", ec=style.LINE, lw=0.0, zorder=-1.0)
     bar = figure.colorbar(image, ax=axis, location="top", shrink=0.7, label=label, format="{x:g}")
     axis.grid(visible=False)
     axis.set_aspect("equal")
     across, along = (f"{name} [mm]" for name in result.map.surface.names)
     axis.set(xlabel=across, ylabel=along)
     return figure, axis, bar
+
+
+def scale(name: str) -> ListedColormap:
+    """The middle of matplotlib's colours of a name, dark where a value is large.
+
+    Both ends stand out on a page, light or dark: `tests/maps/test_map_command.py` measures it.
+    """
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(colormaps[name](np.linspace(*SHADES[name], 256)))
 
 
 def _cut_ends(result: MapResult) -> tuple[Any, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 from scipy.ndimage import label
 
 from palpate.arrays import Array
+from palpate.errors import InputError
 from palpate.files import write_text
 from palpate.maps.gaussian_process import Z95
 from palpate.maps.presses import AXES, Presses
@@ -32,7 +33,9 @@ class Lump:
         ci95: 95 % interval of it [N/m].
         area: where it is more likely than not above the threshold [m^2].
         area95: the same where the probability is above .975, and where it is above .025 [m^2]; place by place.
-        is_sure: whether its stiffest point is above the threshold with a probability above .975.
+        is_sure: whether its stiffest point is above the threshold with a probability above .975, and stays so without
+            the presses that their neighbours contradict.
+        unless: the contradicted press without which the lump is not sure: it may be an outlier instead; "" if none.
     """
 
     place: tuple[float, ...]
@@ -41,6 +44,7 @@ class Lump:
     area: float
     area95: tuple[float, float]
     is_sure: bool
+    unless: str = ""
 
 
 def lumps_of(grid: Grid, prediction: StiffnessPrediction, threshold: float) -> list[Lump]:
@@ -113,7 +117,30 @@ class MapResult:
     def lumps(self) -> list[Lump]:
         """Parts stiffer than the threshold; none without a threshold."""
         threshold = self.request.stiffer_than
-        return [] if threshold is None else lumps_of(self.grid, self.prediction, threshold)
+        lumps = [] if threshold is None else lumps_of(self.grid, self.prediction, threshold)
+        wrong = self.map.disagreeing()
+        if threshold is None or not wrong or not lumps:
+            return lumps
+        tops = np.array([lump.place for lump in lumps])
+        stay = self._without(wrong, tops, threshold) > 0.975
+        nearest = np.linalg.norm(self.map.places[wrong] - tops[:, None], axis=2).argmin(axis=1)
+        return [
+            replace(lump, is_sure=bool(sure), unless="" if sure else self.presses.names[wrong[k]])
+            if lump.is_sure
+            else lump
+            for lump, sure, k in zip(lumps, stay, nearest, strict=True)
+        ]
+
+    def _without(self, presses: Sequence[int], places: Array, threshold: float) -> Array:
+        """Probability of a stiffness above a threshold by all other presses (n,); 0 where these span no surface."""
+        others = StiffnessMap(self.request.common)
+        line = self.presses.line
+        columns = (self.map.places, self.map.stiffness, self.map.half, line)
+        try:
+            others.update(*(None if each is None else np.delete(each, presses, axis=0) for each in columns))
+            return others.predict(places).exceeds(threshold)
+        except InputError:
+            return np.zeros(len(places))
 
     @cached_property
     def next(self) -> NextPresses:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
+from scipy.special import ndtr
 from scipy.stats import norm
 
 from palpate._jit.typed_edge import cast_array, cast_number
@@ -39,6 +40,11 @@ def _log_threshold(threshold: Any) -> float:
     return float(np.log(_number("a threshold", threshold, 1.0 / LARGEST, LARGEST)))
 
 
+def _exp(log: Array) -> Array:
+    """Exponential, of finite numbers: an interval that says nothing ends at `LARGEST` squared and at its inverse."""
+    return np.exp(np.clip(log, -2.0 * np.log(LARGEST), 2.0 * np.log(LARGEST)))
+
+
 @dataclass(frozen=True)
 class StiffnessPrediction:
     """The stiffness at places.
@@ -62,12 +68,12 @@ class StiffnessPrediction:
     @property
     def stiffness(self) -> Array:
         """The median of the stiffness (n,) [N/m]."""
-        return np.exp(self.mean)
+        return _exp(self.mean)
 
     @property
     def relative_half(self) -> Array:
         """Half-width of the 95 % interval over the surface's own value (n,)."""
-        return np.expm1(self.z95 * np.hypot(self.std, self.common))
+        return _exp(self.z95 * np.hypot(self.std, self.common)) - 1.0
 
     @property
     def ci95(self) -> Array:
@@ -84,7 +90,7 @@ class StiffnessPrediction:
         return np.asarray(norm.sf(_log_threshold(threshold), self.mean, np.hypot(self.std, self.common)))
 
     def _interval(self, half: Array) -> Array:
-        return np.exp(self.mean[:, None] + np.outer(half, [-1.0, 1.0]))
+        return _exp(self.mean[:, None] + np.outer(half, [-1.0, 1.0]))
 
 
 @dataclass(frozen=True)
@@ -230,9 +236,8 @@ class StiffnessMap:
         chosen = [place for place, _ in steps]
         left = steps[-1][1]
         unknown = np.maximum(variance - np.diag(covariance), 0.0)  # of the process' parameters
-        std = np.sqrt(left[chosen] + unknown[chosen] + self._common**2)
-        half = np.exp(mean[chosen]) * np.sinh(self.process.z95 * std)
-        return NextPresses(among[chosen], half)
+        width = self.process.z95 * np.sqrt(left[chosen] + unknown[chosen] + self._common**2)
+        return NextPresses(among[chosen], 0.5 * (_exp(mean[chosen] + width) - _exp(mean[chosen] - width)))
 
     def presses_until(self, half: float) -> int | None:
         """Presses after which the interval is under a half-width nearly everywhere.
@@ -276,7 +281,7 @@ class StiffnessMap:
         """Variance of a normal next press, on its own line, whose 95 % are those of one that errs as any before."""
         stated = self._half / (Z95 * self._stiffness)
         std = np.sqrt(stated**2 + self.process.repeat**2 + self.process.shared**2)
-        outside = lambda half: 2.0 * np.mean(norm.sf(half / std)) - LEVEL  # noqa: E731
+        outside = lambda half: 2.0 * np.mean(ndtr(-half / std)) - LEVEL  # noqa: E731
         return float(brentq(outside, Z95 * std.min() / 2.0, 2.0 * Z95 * std.max()) / Z95) ** 2
 
     def _candidates(self) -> Array:

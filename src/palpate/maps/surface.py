@@ -56,13 +56,16 @@ class Surface:
     presses: Array
 
     def __post_init__(self) -> None:
+        count = len(np.unique(self.presses, axis=0))
         try:
-            ConvexHull(self.coordinates(self.presses))
-        except (QhullError, ValueError):
+            spans = count > 2 and ConvexHull(self.coordinates(self.presses))
+        except QhullError:
+            spans = False
+        if not spans:
             raise InputError(
                 "a map needs presses at three places at least that are not in one line; number of places given: "
-                f"{len(np.unique(self.presses, axis=0))}"
-            ) from None
+                f"{count}"
+            )
 
     @property
     def is_curved(self) -> bool:
@@ -87,7 +90,7 @@ class Surface:
         corners = self.coordinates(self.presses)
         low = corners.min(axis=0)
         size = np.ptp(corners, axis=0)
-        cells = np.maximum(np.round(size * np.sqrt(count / np.prod(size))), 1.0).astype(int)
+        cells = np.clip(np.round(size * np.sqrt(count / np.prod(size))), 1.0, count).astype(int)
         steps = size / cells
         across, along = (low[k] + steps[k] * (np.arange(cells[k]) + 0.5) for k in range(2))
         points = np.stack(np.meshgrid(across, along), axis=-1).reshape(-1, 2)

@@ -179,8 +179,8 @@ class PhantomOptions:
     """The phantom and its map."""
 
     map: Path | None = None
-    """A phantom, a TOML file: size, stiffness, damping and [[lumps]] with at, radius, stiffness and edge, in
-    m, N/m and N s/m."""
+    """phantom, which comes with palpate, or a TOML file: size, stiffness, damping and [[lumps]] with at, radius,
+    stiffness and edge, in m, N/m and N s/m."""
     presses: Annotated[int, WHOLE] = 40
     "How many presses: sixteen on a grid, then where the map is worst known."
     stiffer_than: values.Stiffness | None = None

@@ -1,4 +1,4 @@
-/* Figures as panels: each is drawn when it comes into sight, and those over the same axis are zoomed together. */
+/* Figures as panels: those in sight are drawn first, the others while the page rests; those over one axis zoom together. */
 "use strict";
 (() => {
   const element = document.getElementById("panels");
@@ -23,5 +23,7 @@
   }
   const observer = new IntersectionObserver((entries) => entries.forEach((entry) => { if (entry.isIntersecting) { observer.unobserve(entry.target); drawNow(entry.target); } }), { rootMargin: "600px" });
   hosts.forEach((host) => observer.observe(host));
+  const drawNext = () => { const [host] = waiting; if (host) { drawNow(host); setTimeout(drawNext); } };
+  addEventListener("load", () => setTimeout(drawNext, 100));
   addEventListener("beforeprint", () => hosts.forEach(drawNow));
 })();
