@@ -3,7 +3,7 @@
     python benchmarks/force/upstream.py ros2-admittance --source CHECKOUT [--files 1000] [--root PREFIX]
 
 CHECKOUT is a clone of ros-controls/ros2_controllers, or of fzi-forschungszentrum-informatik/cartesian_controllers for
-`fzi`, or of utiasDSL/crisp_controllers for `crisp`, which is not compiled but simulated; its commit is printed. A
+`fzi`, or of utiasDSL/crisp_controllers for `crisp`; its commit is printed. A
 prefix other than /usr that holds Eigen and KDL is given by --root. Without a checkout it says so and ends.
 """
 
@@ -13,12 +13,12 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from upstream_judge import ADMITTANCE, FZI, ImpedanceSimulator, commit, compile_judge
+from upstream_judge import ADMITTANCE, CRISP, FZI, commit, compile_judge
 
 from palpate.certify.controller_answer import ControllerRequest, certify_controller
 
 TICKS = {"ros2-admittance": 16_000, "fzi": 5_000, "crisp": 6_000}
-"""Ticks after which growth shows within a percent of the edge; FZI's are slow and crisp's are simulated."""
+"""Ticks after which growth shows within a percent of the edge."""
 LOW, HIGH = 10.0, 1e7
 
 
@@ -67,20 +67,17 @@ def crisp_file(rng):
     d = float(f"{np.exp(rng.uniform(np.log(2.0), np.log(200.0))):.6g}") if rng.random() < 0.8 else -1.0
     mass, operational = float(f"{rng.uniform(1.0, 10.0):.6g}"), bool(rng.random() < 0.3)
     rate = rng.choice([500, 1000])
-    substeps = ImpedanceSimulator.SUBSTEPS
-    bench = (rate, rng.integers(0, 5 * substeps) / substeps / rate, False, False)
+    bench = (rate, rng.uniform(0.0, 5.0) / rate, False, False)
     axes = "".join(f"task.k_pos_{axis}: {k}\ntask.d_pos_{axis}: {d}\n" for axis in "xyz")
     text = f"update_rate: {rate}\n{axes}use_operational_space: {str(operational).lower()}\n"
-    return text, bench, [k, d if d > 0.0 else 2.0 * k**0.5, mass, operational]
+    return text, bench, [k, d, mass, operational]
 
 
 KINDS = {
     "ros2-admittance": (ADMITTANCE, admittance_file),
     "fzi": (FZI, fzi_file),
-    "crisp": (None, crisp_file),
+    "crisp": (CRISP, crisp_file),
 }
-MAX_SIMULATED = 1e6
-"""Stiffest surface of the simulated judge, whose small steps resolve no faster swing [N/m]."""
 
 
 class Tally:
@@ -114,14 +111,14 @@ def answer(text, kind, bench, mass=None, surfaces=None):
 def compare(judge, kind, text, bench, numbers, rng, tally):
     """Edge and proof of one file against the judge."""
     result, _ = answer(text, kind, bench, numbers[2] if kind == "crisp" else None)
-    high, ticks = MAX_SIMULATED if kind == "crisp" else HIGH, TICKS[kind]
+    ticks = TICKS[kind]
     proved, ranges = result["proved"]["stiffness"], result["exact"]["ranges"]
     late = result["controllers"][0].get("if_only_the_force_is_late")
     if bench[3] and late is not None:
         proved, ranges = late["proved"], late["exact"]
-    edge = judge.ask(("edge", LOW, high, ticks), bench, numbers)
+    edge = judge.ask(("edge", LOW, HIGH, ticks), bench, numbers)
     first = next((end for begin, end in ranges if begin <= LOW < end), LOW)
-    first = np.inf if first >= high else first
+    first = np.inf if first >= HIGH else first
     same = edge == first
     tally.errors.append(0.0 if same else abs(np.log(edge / first)))
     if proved is not None:
@@ -176,14 +173,14 @@ def main():
         print("skipped: no --source with a checkout of upstream")
         return 0
     kind, make = KINDS[options.controller]
-    judge = compile_judge(kind, options.source, [*options.root, "/usr"]) if kind else ImpedanceSimulator()
+    judge = compile_judge(kind, options.source, [*options.root, "/usr"])
     rng, tally = np.random.default_rng(options.seed), Tally()
     for i in range(options.files):
         text, bench, numbers = make(rng)
         edge, first = compare(judge, options.controller, text, bench, numbers, rng, tally)
         if tally.errors[-1] > 0.02:
             print(f"  file {i}: upstream {edge:.6g}, palpate {first:.6g} N/m; {bench} {numbers}")
-        if i < options.corrections and kind is not None:
+        if i < options.corrections and options.controller != "crisp":
             correct(judge, options.controller, text, bench, numbers, rng, tally)
         if (i + 1) % 100 == 0 or i + 1 == options.files:
             print(f"{options.controller}, upstream's commit {commit(options.source)}, {i + 1} random files")

@@ -1,7 +1,7 @@
 """Upstream's own controllers, compiled as they are, on a spring with a delay; nothing here knows of palpate.
 
 The sources of ROS that they include are replaced by the stubs in `upstream/`; each include that the compiler asks for
-becomes a file that includes the stubs. Eigen and, for FZI, KDL are the real ones. CRISP's is simulated.
+becomes a file that includes the stubs. Eigen and, for FZI, KDL are the real ones; CRISP's pinocchio is one joint.
 """
 
 # ruff: noqa: S603, S607 -- it starts the compiler, and what that has made
@@ -9,8 +9,6 @@ becomes a file that includes the stubs. Eigen and, for FZI, KDL are the real one
 import subprocess
 import tempfile
 from pathlib import Path
-
-import numpy as np
 
 HERE = Path(__file__).parent / "upstream"
 ADMITTANCE = {
@@ -53,6 +51,21 @@ FZI = {
         ROS2VersionConfig.h""",
 }
 
+CRISP = {
+    "main": "crisp.cpp",
+    "stubs": "crisp_stubs.hpp",
+    "folders": [".", "include"],
+    "sources": [],
+    "libraries": [],
+    "replaced": """controller_interface/controller_interface.hpp controller_interface/controller_interface_base.hpp
+        rclcpp/rclcpp.hpp rclcpp/logging.hpp geometry_msgs/msg/pose_stamped.hpp geometry_msgs/msg/wrench_stamped.hpp
+        sensor_msgs/msg/joint_state.hpp realtime_tools/realtime_buffer.hpp fmt/format.h pluginlib/class_list_macros.hpp
+        cartesian_impedance_controller_parameters.hpp pinocchio/fwd.hpp pinocchio/multibody/fwd.hpp
+        pinocchio/algorithm/model.hpp pinocchio/algorithm/aba.hpp pinocchio/algorithm/compute-all-terms.hpp
+        pinocchio/algorithm/frames.hxx pinocchio/algorithm/rnea.hpp pinocchio/algorithm/kinematics.hpp
+        pinocchio/parsers/urdf.hpp pinocchio/spatial/explog.hpp pinocchio/spatial/fwd.hpp""",
+}
+
 
 def commit(checkout):
     """Commit of a checkout of upstream."""
@@ -66,7 +79,7 @@ def compile_judge(kind, checkout, roots):
     """Compile a checkout's controller with the bench; the program.
 
     Args:
-        kind: ADMITTANCE or FZI.
+        kind: ADMITTANCE, FZI or CRISP.
         checkout: of upstream.
         roots: prefixes that hold include/eigen3, include/kdl and lib, as /usr does.
     """
@@ -108,57 +121,3 @@ class Judge:
         self._process.stdin.write(" ".join(map(str, words)) + "\n")
         self._process.stdin.flush()
         return float(self._process.stdout.readline())
-
-
-class ImpedanceSimulator:
-    """One axis of CRISP's impedance, read from its source, on an arm whose mass is moved in small steps.
-
-    Its C++ needs pinocchio and a robot's description. All stiffnesses of a task are simulated at once.
-    """
-
-    SUBSTEPS = 40
-
-    def ask(self, task, bench, numbers):
-        """Answer to one task, as that of a compiled judge; the delay must be a whole number of substeps.
-
-        Args:
-            task: `edge LOW HIGH TICKS` or `grows K TICKS`.
-            bench: rate [Hz], delay [s], and two unused flags.
-            numbers: stiffness, damping, mass, and 1 for an operational-space controller.
-        """
-        name, *ends, ticks = task
-        if name == "grows":
-            return float(self._grow(np.array(ends), ticks, bench, numbers)[0])
-        low, high = ends
-        for count in (200, 60):
-            grid = np.geomspace(low, high, count)
-            grows = self._grow(grid, ticks, bench, numbers)
-            if not grows.any():
-                return np.inf
-            first = int(np.argmax(grows))
-            if first == 0:
-                return low
-            low, high = grid[first - 1], grid[first]
-        return low
-
-    def _grow(self, stiffness, ticks, bench, numbers):
-        """True for each stiffness on which the second differences of the position grow."""
-        k, d, mass, operational = numbers
-        step = 1.0 / bench[0] / self.SUBSTEPS
-        late = round(bench[1] / step)
-        x, v = np.zeros_like(stiffness), np.full_like(stiffness, 1e-3)
-        given = [np.zeros_like(stiffness)] * (late // self.SUBSTEPS + 2)
-        first, second, peaks = x, x, np.zeros((2, len(stiffness)))
-        for tick in range(ticks):
-            given = [(mass if operational else 1.0) * (k * -x - d * v), *given[:-1]]
-            for i in range(self.SUBSTEPS):
-                force = given[(late - i + self.SUBSTEPS - 1) // self.SUBSTEPS]
-                v = v + 0.5 * step * (force - stiffness * x) / mass
-                x = x + step * v
-                v = v + 0.5 * step * (force - stiffness * x) / mass
-            if tick >= ticks // 2:
-                half = int(tick >= 3 * ticks // 4)
-                peaks[half] = np.maximum(peaks[half], abs(x - 2.0 * first + second))
-            first, second = x, first
-            x, v = (np.clip(value, -1e12, 1e12) for value in (x, v))
-        return (peaks[1] > peaks[0]) | (abs(x) > 1e9)

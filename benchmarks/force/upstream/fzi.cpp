@@ -41,13 +41,13 @@ int main()
       controller->on_activate({});
       auto wrench = std::make_shared<geometry_msgs::msg::WrenchStamped>();
       auto sensor = node->wrenches.at("controller/ft_sensor_wrench");
-      return Tick([=](double x, double force) {
+      return Tick{[=](double x, double force) {
         controller->state_interfaces_[0].set_value(x);
         wrench->wrench.force.x = force;
         sensor->receive(wrench);
         controller->update({}, rclcpp::Duration::from_seconds(1.0 / rate));
         return controller->command_interfaces_[0].get_value();
-      });
+      }};
     });
   });
 }

@@ -3,6 +3,7 @@
 // Written for this benchmark; it knows nothing of palpate. Tasks come one a line on standard input, each with the
 // numbers of the controller after those of the bench, and one number a line goes out.
 #pragma once
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <iostream>
@@ -11,8 +12,13 @@
 #include <string>
 #include <vector>
 
-// One tick: measured position [m] and force on the tool [N] in; position [m] or velocity [m/s] out.
-using Tick = std::function<double(double, double)>;
+// A controller's tick: measured position [m] and force on the tool [N] in; position [m] or velocity [m/s] out. With a
+// mass [kg], the arm is driven by forces: measured position and velocity in; force [N] out.
+struct Tick
+{
+  std::function<double(double, double)> call;
+  double mass = 0.0;
+};
 
 struct Bench
 {
@@ -21,11 +27,39 @@ struct Bench
   bool sensor;    // the arm follows at once, and the force alone is late
 };
 
+// Move a mass on a spring under a constant force, exactly.
+inline void move(double mass, double stiffness, double force, double time, double & x, double & v)
+{
+  const double w = std::sqrt(stiffness / mass), rest = force / stiffness, c = std::cos(w * time), s = std::sin(w * time);
+  const double away = x - rest, speed = v;
+  x = rest + away * c + speed / w * s;
+  v = speed * c - away * w * s;
+}
+
+// Positions at the ticks while an arm driven by forces presses a spring.
+inline void run_forces(
+  const Bench & bench, const Tick & tick, double stiffness, long ticks, const std::function<double(long)> & push,
+  const std::function<bool(long, double)> & see)
+{
+  const double late = bench.delay * bench.rate;
+  const long whole = static_cast<long>(std::floor(late + 1e-9));
+  const double part = std::max(0.0, late - double(whole));
+  std::vector<double> commands;
+  auto command = [&](long k) { return k < 0 ? 0.0 : commands[static_cast<size_t>(k)]; };
+  double x = 0.0, v = 0.0;
+  for (long k = 0; k < ticks && see(k, x); ++k) {
+    commands.push_back(tick.call(x, v));
+    move(tick.mass, stiffness, command(k - 1 - whole) + push(k), part / bench.rate, x, v);
+    move(tick.mass, stiffness, command(k - whole) + push(k), (1.0 - part) / bench.rate, x, v);
+  }
+}
+
 // Positions at the ticks while the tool presses a spring, the force being pushed by u(k) newton.
 inline void run(
   const Bench & bench, const Tick & tick, double stiffness, long ticks, const std::function<double(long)> & push,
   const std::function<bool(long, double)> & see)
 {
+  if (tick.mass > 0.0) return run_forces(bench, tick, stiffness, ticks, push, see);
   const double late = bench.delay * bench.rate;
   std::vector<double> commands, places;
   double x = 0.0;
@@ -44,7 +78,7 @@ inline void run(
     const long seen = bench.sensor ? newest(double(k), late) + 1 : k;
     const double pressed = seen < 0 ? 0.0 : places[static_cast<size_t>(seen)];
     if (!see(k, pressed)) return;
-    commands.push_back(tick(x, push(k) - stiffness * pressed));
+    commands.push_back(tick.call(x, push(k) - stiffness * pressed));
   }
 }
 
