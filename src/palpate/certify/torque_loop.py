@@ -8,6 +8,7 @@ cosines); that of kappa s is (s' + c')/2, at most (1/6 + 1/2)/2 = 1/3.
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import lru_cache
 from math import ceil, factorial, isqrt
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -121,6 +122,7 @@ class TorqueSpringLoop(NamedTuple):
         return swing.transpose(2, 0, 1), forced.T
 
 
+@lru_cache(64)
 def _oscillation(stiffness: Fraction, mass: Fraction, time: Fraction) -> tuple[list[list[Any]], list[Any]]:
     """Position and velocity after a time from those before it, and from a constant force of 1 N; in fractions."""
     kappa = stiffness * time**2 / mass
@@ -131,11 +133,13 @@ def _oscillation(stiffness: Fraction, mass: Fraction, time: Fraction) -> tuple[l
 
 def _series(kappa: Fraction, first: int) -> Fraction:
     """Sum of (-kappa)^j/(2 j + first)!, with an error below 2^-500: its terms alternate, and fall after a while."""
-    unit = 1 << (BITS + 2 * isqrt(ceil(kappa)))
-    total = term = Fraction(1, factorial(first))
+    bits = BITS + 2 * isqrt(ceil(kappa))
+    total = term = (1 << bits) // factorial(first)  # in units of 2^-bits: whole numbers are faster than fractions
+    up, down = -kappa.numerator, kappa.denominator
     j = 1
     while term or (2 * j + first) ** 2 <= kappa:
-        term = Fraction(round(term * -kappa / ((2 * j + first - 1) * (2 * j + first)) * unit), unit)
+        divisor = down * (2 * j + first - 1) * (2 * j + first)
+        term = (2 * term * up + divisor) // (2 * divisor)
         total += term
         j += 1
-    return total
+    return Fraction(total, 1 << bits)
