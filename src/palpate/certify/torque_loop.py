@@ -134,7 +134,9 @@ def _oscillation(stiffness: Fraction, mass: Fraction, time: Fraction) -> tuple[l
 def _series(kappa: Fraction, first: int) -> Fraction:
     """Sum of (-kappa)^j/(2 j + first)!, with an error below 2^-500: its terms alternate, and fall after a while."""
     bits = BITS + 2 * isqrt(ceil(kappa))
-    total = term = (1 << bits) // factorial(first)  # in units of 2^-bits: whole numbers are faster than fractions
+    total = term = (1 << bits) // factorial(
+        first
+    )  # in units of 2^-bits: whole numbers are faster than fractions
     up, down = -kappa.numerator, kappa.denominator
     j = 1
     while term or (2 * j + first) ** 2 <= kappa:
