@@ -24,6 +24,8 @@ from palpate.certify.controller_answer import ControllerRequest, certify_control
 TICKS = {"ros2-admittance": 16_000, "fzi": 5_000, "crisp": 6_000}
 """Ticks after which growth shows within a percent of the edge."""
 LOW, HIGH = 10.0, 1e7
+FREE = 0.1
+"""Stiffness that stands for free motion [N/m]."""
 LIMITS = (("grows", 0.5), ("overshoot", 0.1), ("unsettled", 0.1))
 """Of what the judge calls a good setting: neither growth nor overshoot, and settled in half of the run."""
 SETTINGS_TRIED = 100
@@ -141,9 +143,18 @@ def compare(judge, kind, text, bench, numbers, rng):
 
 
 def exceeds(judge, kind, task, limit, bench, numbers, surfaces):
-    """True if a task's number exceeds the limit on some of the surfaces."""
-    ticks = TICKS[kind] * (1 if task == "grows" else 5)
-    return any(judge.ask((task, K, ticks), bench, numbers) > limit for K in surfaces)
+    """True if a task's number exceeds the limit on some of the surfaces.
+
+    Growth is tried in free motion too, and for one tick more of delay, which each answer promises.
+    """
+    later = (bench[0], bench[1] + 1.0 / bench[0], *bench[2:])
+    if task != "grows":
+        return any(judge.ask((task, K, 5 * TICKS[kind]), bench, numbers) > limit for K in surfaces)
+    return any(
+        judge.ask((task, K, TICKS[kind]), b, numbers) > limit
+        for K in (*surfaces, FREE)
+        for b in (bench, later)
+    )
 
 
 def correct(judge, kind, text, bench, numbers, rng):

@@ -72,7 +72,7 @@ def test_an_acceptable_law_is_left_as_it_is():
 
 def test_a_position_interface_that_repeats_its_motion_has_no_correction():
     (node,) = find_controllers({"pd_gains": {"trans_x": {"p": 0.05}}}, "a", "fzi").nodes
-    with pytest.raises(CorrectionError, match="repeats every n ticks"):
+    with pytest.raises(CorrectionError, match="repeated every n ticks"):
         correct_node(node, [AxisLaw("x", ForwardDynamics(0.05, 0.0))], Timing(500.0, 0.01), (1e3, 1e4))
 
 

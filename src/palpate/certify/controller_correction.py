@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from palpate.arrays import Array
     from palpate.certify.controller_file import AxisLaw, ControllerFile, ControllerNode, Law
 
+REPEATED_MOTION = (
+    "with a position interface the solver starts each tick at the measured position, so that a motion which is "
+    "measured n ticks late is repeated every n ticks"
+)
 MAX_OVERSHOOT = 0.08
 """Overshoot of a corrected loop on the surfaces that are tried; 10 % are promised on those between."""
 SURFACES_TRIED = 17
@@ -125,14 +129,8 @@ def _correct_forward_dynamics(
         ]
         if all(is_acceptable(law, timing, surfaces) for law in dict.fromkeys(scaled)):
             return {"solver.error_scale": smaller}
-    raise CorrectionError(
-        f"{NO_SETTING}: no smaller error_scale helps" + (
-            "; behind a position interface the solver starts at the measured position, so that a motion which is late "
-            "by n ticks repeats every n ticks, whatever the gain"
-            if timing.interface == "position"
-            else ""
-        )
-    )  # fmt: skip
+    why = f"; {REPEATED_MOTION}, whatever the gain" if timing.interface == "position" else ""
+    raise CorrectionError(f"{NO_SETTING}: no smaller error_scale helps{why}")
 
 
 def _impedances(law: CartesianImpedance, *, follows_stiffness: bool) -> Iterator[CartesianImpedance]:
