@@ -17,10 +17,6 @@ ADMITTANCE = {
     "folders": ["admittance_controller/include"],
     "sources": [],
     "libraries": [],
-    "replaced": """admittance_controller/admittance_controller_parameters.hpp
-        control_msgs/msg/admittance_controller_state.hpp controller_interface/controller_interface_base.hpp
-        kinematics_interface/kinematics_interface.hpp pluginlib/class_loader.hpp control_toolbox/filters.hpp
-        trajectory_msgs/msg/joint_trajectory_point.hpp tf2_eigen/tf2_eigen.hpp rclcpp/duration.hpp""",
 }
 BASE = (
     "ForwardDynamicsSolver",
@@ -39,16 +35,6 @@ FZI = {
         *(f"{name}/src/{name}.cpp" for name in PACKAGES),
     ],
     "libraries": ["-lorocos-kdl"],
-    "replaced": """rclcpp/rclcpp.hpp rclcpp/node.hpp rclcpp/clock.hpp rclcpp/duration.hpp
-        rclcpp_lifecycle/lifecycle_node.hpp rclcpp_lifecycle/node_interfaces/lifecycle_node_interface.hpp
-        hardware_interface/loaned_command_interface.hpp hardware_interface/loaned_state_interface.hpp
-        hardware_interface/types/hardware_interface_type_values.hpp controller_interface/controller_interface.hpp
-        controller_interface/helpers.hpp geometry_msgs/msg/pose_stamped.hpp geometry_msgs/msg/twist_stamped.hpp
-        geometry_msgs/msg/wrench_stamped.hpp geometry_msgs/msg/detail/pose_stamped__struct.hpp
-        geometry_msgs/msg/detail/twist_stamped__struct.hpp trajectory_msgs/msg/joint_trajectory_point.hpp
-        pluginlib/class_loader.hpp pluginlib/class_list_macros.hpp realtime_tools/realtime_publisher.h urdf/model.h
-        urdf_model/joint.h kdl_parser/kdl_parser.hpp cartesian_controller_base/ROS2VersionConfig.h
-        ROS2VersionConfig.h""",
 }
 
 CRISP = {
@@ -57,13 +43,6 @@ CRISP = {
     "folders": [".", "include"],
     "sources": [],
     "libraries": [],
-    "replaced": """controller_interface/controller_interface.hpp controller_interface/controller_interface_base.hpp
-        rclcpp/rclcpp.hpp rclcpp/logging.hpp geometry_msgs/msg/pose_stamped.hpp geometry_msgs/msg/wrench_stamped.hpp
-        sensor_msgs/msg/joint_state.hpp realtime_tools/realtime_buffer.hpp fmt/format.h pluginlib/class_list_macros.hpp
-        cartesian_impedance_controller_parameters.hpp pinocchio/fwd.hpp pinocchio/multibody/fwd.hpp
-        pinocchio/algorithm/model.hpp pinocchio/algorithm/aba.hpp pinocchio/algorithm/compute-all-terms.hpp
-        pinocchio/algorithm/frames.hxx pinocchio/algorithm/rnea.hpp pinocchio/algorithm/kinematics.hpp
-        pinocchio/parsers/urdf.hpp pinocchio/spatial/explog.hpp pinocchio/spatial/fwd.hpp""",
 }
 
 
@@ -84,18 +63,20 @@ def compile_judge(kind, checkout, roots):
         roots: prefixes that hold include/eigen3, include/kdl and lib, as /usr does.
     """
     folder = Path(tempfile.mkdtemp(prefix="upstream-"))
-    for name in kind["replaced"].split():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_text(f'#include "{kind["stubs"]}"\n')
     includes = [folder, HERE, *(Path(checkout) / name for name in kind["folders"])]
     includes += [Path(root) / name for root in roots for name in ("include/eigen3", "include")]
     libraries = [
         path for root in roots for path in Path(root).glob("lib/*/") if list(path.glob("liborocos-kdl.so"))
     ]
-    command = ["g++", "-O2", "-std=c++17", *(f"-I{path}" for path in includes), HERE / kind["main"]]
-    command += [Path(checkout) / name for name in kind["sources"]]
-    command += [f"-{flag}{path}" for path in libraries for flag in ("L", "Wl,-rpath,")]
-    subprocess.run([*command, *kind["libraries"], "-o", folder / "judge"], check=True)
+    compiler = ["g++", "-O2", "-std=c++17", *(f"-I{path}" for path in includes)]
+    sources = [HERE / kind["main"], *(Path(checkout) / name for name in kind["sources"])]
+    included = subprocess.run([*compiler, "-M", "-MG", *sources], capture_output=True, text=True, check=True)
+    for name in included.stdout.split():
+        if not name.endswith((":", "\\")) and not Path(name).exists():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text(f'#include "{kind["stubs"]}"\n')
+    linked = [f"-{flag}{path}" for path in libraries for flag in ("L", "Wl,-rpath,")]
+    subprocess.run([*compiler, *sources, *linked, *kind["libraries"], "-o", folder / "judge"], check=True)
     return Judge(folder / "judge")
 
 

@@ -75,9 +75,7 @@ def test_the_answer_is_of_the_worst_axis():
 def test_numbers_that_run_away_are_said_and_not_proved():
     result = certify(ADMITTANCE.replace("2.8", "121.5"), "ros2-admittance").answer
     reason = result["controllers"][0]["axes"]["x"]["reason"]
-    assert (
-        "in free motion it runs away: (D/M + joint_damping)/update_rate must be below 2 and is 7.98" in reason
-    )
+    assert "runs away: (D/M + joint_damping)/update_rate must be below 2 and is 7.98" in reason
     assert result["proved"]["stiffness"] is result["exact"]["stiffness"] is None
 
 
@@ -108,9 +106,7 @@ def test_an_axis_without_stiffness_is_corrected_with_one():
 def test_without_a_setting_a_sentence_says_why():
     verdict = certify(CRISP, "crisp", surfaces=(1e3, 1e7), rate=100.0, mass=3.0)
     assert verdict.corrected is None
-    assert (
-        "no numbers were found that this rule can run at this rate" in verdict.answer["not_corrected_because"]
-    )
+    assert "that this rule can run at this rate" in verdict.answer["not_corrected_because"]
 
 
 def test_a_torque_arm_is_proved_and_its_null_space_is_noted():
@@ -119,6 +115,8 @@ def test_a_torque_arm_is_proved_and_its_null_space_is_noted():
     assert verdict.holds
     notes = " ".join(verdict.answer["controllers"][0]["notes"])
     assert all(word in notes for word in ("use_friction", "damping -1", "use_local_jacobian false"))
+    franka = certify("translational_stiffness: 200.0\n", "franka", delay=0.002, mass=3.0).answer
+    assert "never compared with a run" in franka["controllers"][0]["notes"][0]
 
 
 STILL = "".join(f"task.k_pos_{axis}: 0.0\ntask.k_rot_{axis}: 0.0\n" for axis in "xyz")
@@ -134,23 +132,17 @@ def test_an_arm_without_a_force_loop_is_answered_and_not_corrected(text, says):
     assert verdict.answer["proved"]["stiffness"] is verdict.answer["first_unstable"] is None
     assert verdict.answer["not_corrected_because"] == "no axis has a force loop"
     assert all(says in axis["reason"] for axis in verdict.answer["controllers"][0]["axes"].values())
-    (claim,) = [line for line in answer_lines(verdict.answer, None) if line.startswith("Nothing to prove")]
+    claim = answer_lines(verdict.answer, None)[1]
+    assert claim.startswith("Nothing to prove")
     assert says in claim
     assert "Not modelled: the other five axes" in claim
-
-
-def test_what_is_said_of_franka_names_what_was_not_judged():
-    result = certify("translational_stiffness: 200.0\n", "franka", delay=0.002, mass=3.0).answer
-    assert "never compared with a run" in " ".join(result["controllers"][0]["notes"])
 
 
 def test_controllers_that_do_not_measure_the_force_are_passed_over():
     result = certify(FORCE, "fzi", delay=0.010).answer
     assert [node["node"] for node in result["controllers"]] == ["force"]
     assert len(result["passed_over"]) == 2
-    assert result["exact"]["stiffness"][1] == pytest.approx(23.9e3 / 2.0, rel=0.001), (
-        "error_scale is 1, not 0.5"
-    )
+    assert result["exact"]["stiffness"][1] == pytest.approx(23.9e3 / 2.0, rel=0.001)  # error_scale 1, not 0.5
 
 
 def test_a_late_arm_behind_a_position_interface_is_told_from_a_late_force():

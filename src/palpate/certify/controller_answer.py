@@ -124,17 +124,17 @@ def certify_controller(path: Path, request: ControllerRequest) -> ControllerVerd
     headline = ranges[0] if ranges else None
     holds = _covers(proved, request.surfaces)
     corrected, text = None, None
-    why: str | None = "no surfaces are asked for (--stiffness LOW:HIGH)"
-    if request.surfaces is not None:
-        why = "the loop is stable on the surfaces asked for"
-        if not laws:
-            why = "no axis has a force loop"
-        elif not holds:
-            try:
-                corrected, text = _correct(file, request, path)
-                why = None
-            except CorrectionError as error:
-                why = str(error)
+    reasons = {
+        "no axis has a force loop": not laws,
+        "no surfaces are asked for (--stiffness LOW:HIGH)": request.surfaces is None,
+        "the loop is stable on the surfaces asked for": holds,
+    }
+    why = next((reason for reason, applies in reasons.items() if applies), None)
+    if why is None:
+        try:
+            corrected, text = _correct(file, request, path)
+        except CorrectionError as error:
+            why = str(error)
     answer = {
         "controller": request.controller,
         "source": SOURCES[request.controller]._asdict(),
@@ -147,11 +147,7 @@ def certify_controller(path: Path, request: ControllerRequest) -> ControllerVerd
         "not_corrected_because": why,
         "not_modelled": NOT_MODELLED[request.controller],
         "unused": [
-            *(
-                f"{n['node']}.{u}".lstrip(".")
-                for n, node in zip(nodes, file.nodes, strict=True)
-                for u in node.unused
-            ),
+            *(f"{node.name}.{entry}".lstrip(".") for node in file.nodes for entry in node.unused),
             *file.other,
         ],
     }
@@ -167,16 +163,12 @@ def _with_force(file: ControllerFile, request: ControllerRequest) -> tuple[Contr
     nodes, passed = [], []
     for node in file.nodes:
         try:
-            laws, _ = node_laws(node, file, request)
+            node_laws(node, file, request)
+            nodes.append(node)
         except files.NoForceError as error:
             if len(file.nodes) == 1:
                 raise
             passed.append(str(error))
-            continue
-        if any(law is not None for _, law, _ in laws) or len(file.nodes) == 1:
-            nodes.append(node)
-        else:
-            passed.append(f"{node.where}: {laws[0].reason}")
     if not nodes:
         raise InputError("; ".join(passed))
     return file._replace(nodes=nodes), passed
@@ -211,16 +203,29 @@ def node_laws(
     assert request.delay is not None
     if request.mass is not None and request.mass <= 0.0:
         raise InputError(f"--mass must be above 0 kg, got {request.mass:g}")
-    if not 1.0 <= rate <= files.MAX_RATE or not 0.0 <= request.delay * rate <= MAX_DELAY_TICKS:
-        raise InputError(
-            f"{node.where}: a rate from 1 to {files.MAX_RATE:g} Hz and a delay up to {MAX_DELAY_TICKS} ticks are "
-            f"modelled, got {rate:g} Hz and {request.delay:g} s"
-        )
+    check_timing(rate, request.delay, f"{node.where}: ")
     if torque:
         read = files.crisp_axes if controller == "crisp" else files.franka_axes
-        return read(node, float(request.mass or 0.0)), Timing(rate, request.delay, "torque")
-    axes = files.admittance_axes(node) if controller == "ros2-admittance" else files.fzi_axes(node)
-    return axes, Timing(rate, request.delay, files.node_interface(node))
+        axes, interface = read(node, float(request.mass or 0.0)), "torque"
+    else:
+        axes = files.admittance_axes(node) if controller == "ros2-admittance" else files.fzi_axes(node)
+        interface = files.node_interface(node)
+    if len(file.nodes) > 1 and not any(axis.law for axis in axes):
+        raise files.NoForceError(f"{node.where}: {axes[0].reason}")
+    return axes, Timing(rate, request.delay, interface)
+
+
+def check_timing(rate: float, delay: float, where: str = "") -> None:
+    """Refuse a rate or a delay beyond what is modelled.
+
+    Raises:
+        InputError: one is out of range.
+    """
+    if not 1.0 <= rate <= files.MAX_RATE or not 0.0 <= delay * rate <= MAX_DELAY_TICKS:
+        raise InputError(
+            f"{where}a rate from 1 to {files.MAX_RATE:g} Hz and a delay up to {MAX_DELAY_TICKS} ticks are modelled, "
+            f"got {rate:g} Hz and {delay:g} s"
+        )
 
 
 def _judge_node(node: ControllerNode, file: ControllerFile, request: ControllerRequest) -> dict[str, Any]:

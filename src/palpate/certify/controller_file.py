@@ -35,8 +35,11 @@ SECTIONS = {
 PLUGINS = {
     "ros2-admittance": ("admittance_controller/",),
     "fzi": (
-        *(f"cartesian_{kind}_controller/" for kind in ("force", "compliance", "motion")),
-        *(f"{interface}_controllers/Cartesian" for interface in ("position", "velocity")),
+        "cartesian_force_controller/",
+        "cartesian_compliance_controller/",
+        "cartesian_motion_controller/",
+        "position_controllers/Cartesian",
+        "velocity_controllers/Cartesian",
     ),
     "crisp": ("crisp_controllers/",),
     "franka": ("franka_example_controllers/",),
@@ -372,7 +375,7 @@ def _with_joint_torques(node: ControllerNode, axes: list[AxisLaw]) -> list[AxisL
     stiffness = node.number("nullspace.stiffness", 1.0, 0.0, 500.0)
     damping = node.number("nullspace.damping", -1.0, -1.0, 500.0)
     weights = [value for name, value in node.entries.items() if name.startswith("nullspace.weights.")]
-    if projector != "none" or not (stiffness or damping) or (weights and not any(w != 0 for w in weights)):
+    if projector != "none" or not (stiffness or damping) or (weights and not any(weights)):
         return axes
     turns = any(
         node.entries.get(f"task.k_rot_{axis}", 30.0) != 0
