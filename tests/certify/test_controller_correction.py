@@ -59,9 +59,7 @@ def test_a_corrected_admittance_overshoots_little_between_the_surfaces_that_were
     better = law._replace(**{name.rpartition(".")[2]: values[0] for name, values in changes.items()})
     assert better.decay(timing.rate) < 2.0
     assert overshoot(better.loop(timing), rng.uniform(*surfaces, 40)).max() < 0.1
-    assert all(values[1] in (3.0, 9.0, 1.0) for values in changes.values()), (
-        "an axis without a loop is left alone"
-    )
+    assert all(values[1] in (3.0, 9.0, 1.0) for values in changes.values())  # an axis without a loop stays
 
 
 def test_an_acceptable_law_is_left_as_it_is():
@@ -72,7 +70,7 @@ def test_an_acceptable_law_is_left_as_it_is():
 
 def test_a_position_interface_that_repeats_its_motion_has_no_correction():
     (node,) = find_controllers({"pd_gains": {"trans_x": {"p": 0.05}}}, "a", "fzi").nodes
-    with pytest.raises(CorrectionError, match="repeats every n ticks"):
+    with pytest.raises(CorrectionError, match="repeated every n ticks"):
         correct_node(node, [AxisLaw("x", ForwardDynamics(0.05, 0.0))], Timing(500.0, 0.01), (1e3, 1e4))
 
 

@@ -27,11 +27,11 @@ ANSWER = {
 def test_every_part_of_an_answer_is_said():
     text = "\n".join(answer_lines(ANSWER, None))
     for part in (
-        "c.cpp of a/b, 0123456789ab", "Proved stable in exact arithmetic on 2 N/m to 1.9 kN/m",
-        "not modelled are six axes",
+        "c.cpp of a/b, 0123456789ab", "Proved stable on surfaces of 2 N/m to 1.9 kN/m, in exact",
+        "Not modelled: six axes",
         "  x, y: stable on 1 N/m to 2 kN/m and 4 kN/m to 10 MN/m; proved on 2 N/m to 1.9 kN/m; overshoot up to 31 %",
         "  z: gain 0", "only the force is late: stable on no surface", "solver.iterations 1", "Note: a note",
-        "Passed over: m: no force", "Not used, of the file: n.a.(b, c)", "n.solver.error_scale 0.25 (--out FILE.yaml",
+        "Passed over: m: no force", "does not use: n.a.(b, c)", "n.solver.error_scale 0.25 (--out FILE.yaml",
     ):  # fmt: skip
         assert part in text
 
@@ -39,7 +39,7 @@ def test_every_part_of_an_answer_is_said():
 def test_eigenvalues_alone_are_not_called_a_proof():
     none = {"proved": {"stiffness": None}, "corrected": None, "not_corrected_because": "of this"}
     text = "\n".join(answer_lines(ANSWER | none, None))
-    assert "Not proved; by eigenvalues alone" in text
+    assert "Not proved. Computed without a proof, by eigenvalues" in text
     assert "Proved" not in text
     assert "No corrected numbers: of this." in text
     assert span((0.5, 2.5e6)) == "0.5 N/m to 2.5 MN/m"

@@ -16,13 +16,13 @@ int main()
       trajectory_msgs::msg::JointTrajectoryPoint now, reference;
       for (auto * point : {&now, &reference}) point->positions = point->velocities = point->accelerations = {0.0};
       auto wanted = reference;
-      return Tick([=](double x, double force) mutable {
+      return Tick{[=](double x, double force) mutable {
         geometry_msgs::msg::Wrench wrench;
         wrench.force.x = force;
         now.positions[0] = x;
         rule->update(now, wrench, reference, rclcpp::Duration(1.0 / rate), wanted);
         return velocity ? wanted.velocities[0] : wanted.positions[0];
-      });
+      }};
     });
   });
 }

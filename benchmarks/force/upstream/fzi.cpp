@@ -41,13 +41,15 @@ int main()
       controller->on_activate({});
       auto wrench = std::make_shared<geometry_msgs::msg::WrenchStamped>();
       auto sensor = node->wrenches.at("controller/ft_sensor_wrench");
-      return Tick([=](double x, double force) {
+      // The spring of the compliance controller: KDL takes a displacement below 1e-6 m as none, upstream clamps at 1 m.
+      const double smallest = stiffness > 0.0 ? 1e-6 : 0.0, largest = stiffness > 0.0 ? 1.0 : 1e12;
+      return Tick{[=](double x, double force) {
         controller->state_interfaces_[0].set_value(x);
         wrench->wrench.force.x = force;
         sensor->receive(wrench);
         controller->update({}, rclcpp::Duration::from_seconds(1.0 / rate));
         return controller->command_interfaces_[0].get_value();
-      });
+      }, 0.0, smallest, largest};
     });
   });
 }

@@ -12,6 +12,7 @@ import numpy as np
 
 from palpate.certify import controller_file as files
 from palpate.certify.controller_correction import (
+    REPEATED_MOTION,
     CorrectionError,
     correct_node,
     dump,
@@ -34,7 +35,7 @@ from palpate.errors import InputError
 from palpate.files import parse_yaml
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator, Sequence
     from pathlib import Path
 
 MAX_PROVED_TICKS = 80
@@ -46,7 +47,8 @@ NOT_MODELLED = {
     "ros2-admittance": "the other five axes and their coupling, the kinematics with its alpha, joint limits, "
     "saturation, the arm's servo beyond the delay",
     "fzi": "the other five axes and their coupling, the kinematics with its virtual link masses (1 kg at the tip is "
-    "taken), joint limits, saturation, the arm's servo beyond the delay",
+    "taken), joint limits, saturation (the compliance controller's spring is limited to 1 m, and below 1 um it is 0), "
+    "the arm's servo beyond the delay",
     "crisp": "the other five axes and their coupling, the kinematics, the null space, error_clip, the limit "
     "max_delta_tau of the torque's change, friction and its compensation, elastic joints",
     "franka": "the other five axes and their coupling, the kinematics, the null space, the limit of the torque's "
@@ -118,40 +120,34 @@ def certify_controller(path: Path, request: ControllerRequest) -> ControllerVerd
     file, passed = _with_force(files.read_controllers(path, request.controller), request)
     nodes = [_judge_node(node, file, request) for node in file.nodes]
     laws = [axis for node in nodes for axis in node["axes"].values() if axis["ranges"] is not None]
-    if not laws:
-        reasons = dict.fromkeys(axis["reason"] for node in nodes for axis in node["axes"].values())
-        raise InputError(f"{path}: no axis has a force loop: {'; '.join(reasons)}")
-    ranges = _common([axis["ranges"] for axis in laws])
-    proved = _common([[axis["proved"]] if axis["proved"] else [] for axis in laws])
+    ranges, proved = _common_ranges([(axis["ranges"], axis["proved"]) for axis in laws])
     headline = ranges[0] if ranges else None
     holds = _covers(proved, request.surfaces)
     corrected, text = None, None
-    why: str | None = "no surfaces are asked for (--stiffness LOW:HIGH)"
-    if request.surfaces is not None:
-        why = "the loop is stable on the surfaces asked for"
-        if not holds:
-            try:
-                corrected, text = _correct(file, request, path)
-                why = None
-            except CorrectionError as error:
-                why = str(error)
+    reasons = {
+        "no axis has a force loop": not laws,
+        "no surfaces are asked for (--stiffness LOW:HIGH)": request.surfaces is None,
+        "the loop is stable on the surfaces asked for": holds,
+    }
+    why = next((reason for reason, applies in reasons.items() if applies), None)
+    if why is None:
+        try:
+            corrected, text = _correct(file, request, path)
+        except CorrectionError as error:
+            why = str(error)
     answer = {
         "controller": request.controller,
         "source": SOURCES[request.controller]._asdict(),
-        "proved": {"stiffness": proved[0] if proved else None},
+        "proved": {"stiffness": proved},
         "exact": {"stiffness": headline, "ranges": ranges, "points_per_decade": POINTS_PER_DECADE},
-        "first_unstable": _first_unstable(headline),
+        "first_unstable": _first_unstable(headline) if laws else None,
         "controllers": nodes,
         "passed_over": passed,
         "corrected": corrected,
         "not_corrected_because": why,
         "not_modelled": NOT_MODELLED[request.controller],
         "unused": [
-            *(
-                f"{n['node']}.{u}".lstrip(".")
-                for n, node in zip(nodes, file.nodes, strict=True)
-                for u in node.unused
-            ),
+            *(f"{node.name}.{entry}".lstrip(".") for node in file.nodes for entry in node.unused),
             *file.other,
         ],
     }
@@ -167,16 +163,12 @@ def _with_force(file: ControllerFile, request: ControllerRequest) -> tuple[Contr
     nodes, passed = [], []
     for node in file.nodes:
         try:
-            laws, _ = node_laws(node, file, request)
+            node_laws(node, file, request)
+            nodes.append(node)
         except files.NoForceError as error:
             if len(file.nodes) == 1:
                 raise
             passed.append(str(error))
-            continue
-        if any(law is not None for _, law, _ in laws) or len(file.nodes) == 1:
-            nodes.append(node)
-        else:
-            passed.append(f"{node.where}: {laws[0].reason}")
     if not nodes:
         raise InputError("; ".join(passed))
     return file._replace(nodes=nodes), passed
@@ -191,6 +183,7 @@ def node_laws(
         InputError: an entry that is not modelled, or a number that is missing.
     """
     controller = request.controller
+    files.check_plugin(node, controller)
     rate = files.node_rate(node, file.rate)
     if request.rate is not None or controller == "franka":
         rate = request.rate or files.FRANKA_RATE
@@ -210,16 +203,29 @@ def node_laws(
     assert request.delay is not None
     if request.mass is not None and request.mass <= 0.0:
         raise InputError(f"--mass must be above 0 kg, got {request.mass:g}")
-    if not 1.0 <= rate <= files.MAX_RATE or not 0.0 <= request.delay * rate <= MAX_DELAY_TICKS:
-        raise InputError(
-            f"{node.where}: a rate from 1 to {files.MAX_RATE:g} Hz and a delay up to {MAX_DELAY_TICKS} ticks are "
-            f"modelled, got {rate:g} Hz and {request.delay:g} s"
-        )
+    check_timing(rate, request.delay, f"{node.where}: ")
     if torque:
         read = files.crisp_axes if controller == "crisp" else files.franka_axes
-        return read(node, float(request.mass or 0.0)), Timing(rate, request.delay, "torque")
-    axes = files.admittance_axes(node) if controller == "ros2-admittance" else files.fzi_axes(node)
-    return axes, Timing(rate, request.delay, files.node_interface(node))
+        axes, interface = read(node, float(request.mass or 0.0)), "torque"
+    else:
+        axes = files.admittance_axes(node) if controller == "ros2-admittance" else files.fzi_axes(node)
+        interface = files.node_interface(node)
+    if len(file.nodes) > 1 and not any(axis.law for axis in axes):
+        raise files.NoForceError(f"{node.where}: {axes[0].reason}")
+    return axes, Timing(rate, request.delay, interface)
+
+
+def check_timing(rate: float, delay: float, where: str = "") -> None:
+    """Refuse a rate or a delay beyond what is modelled.
+
+    Raises:
+        InputError: one is out of range.
+    """
+    if not 1.0 <= rate <= files.MAX_RATE or not 0.0 <= delay * rate <= MAX_DELAY_TICKS:
+        raise InputError(
+            f"{where}a rate from 1 to {files.MAX_RATE:g} Hz and a delay up to {MAX_DELAY_TICKS} ticks are modelled, "
+            f"got {rate:g} Hz and {delay:g} s"
+        )
 
 
 def _judge_node(node: ControllerNode, file: ControllerFile, request: ControllerRequest) -> dict[str, Any]:
@@ -246,9 +252,8 @@ def _judge_node(node: ControllerNode, file: ControllerFile, request: ControllerR
     if request.controller == "fzi" and timing.interface == "position" and timing.delay * timing.rate >= 1.0:
         sensor = timing._replace(sensor=True)
         ideal = [judge_law(law, sensor, soft) for _, law, _ in laws if law is not None]
-        ranges = _common([list(v.ranges) for v in ideal])
-        proved = _common([[v.proved] if v.proved else [] for v in ideal])
-        result["if_only_the_force_is_late"] = {"exact": ranges, "proved": proved[0] if proved else None}
+        ranges, proved = _common_ranges([(verdict.ranges, verdict.proved) for verdict in ideal])
+        result["if_only_the_force_is_late"] = {"exact": ranges, "proved": proved}
     return result
 
 
@@ -259,25 +264,35 @@ def _notes(node: ControllerNode, file: ControllerFile, request: ControllerReques
     if controller in ("ros2-admittance", "fzi"):
         kinds = node.entries.get("command_interfaces", ())
         if isinstance(kinds, list) and len(kinds) > 1:
-            notes.append("the arm is taken to follow the position of its two interfaces")
+            notes.append("the file commands position and velocity; the arm is taken to follow the position")
         if controller == "fzi" and node.has("solver.forward_dynamics"):
             notes.append(
-                "the source declares solver/forward_dynamics/link_mass, with slashes: the entry has no effect"
+                "solver.forward_dynamics.link_mass has no effect: the source declares it with slashes"
             )
     whole = [name for name in node.used if name != "solver.iterations" and _has_integer(node.entries[name])]
     if whole and controller != "franka":
-        notes.append(f"ROS 2 may refuse a number without a decimal point here: {files.named(sorted(whole))}")
-    if controller == "crisp":
-        if node.entries.get("use_friction") is True:
-            notes.append("use_friction: its torque is taken to cancel the joints' friction")
-        if (
-            node.entries.get("nullspace.damping", -1.0) == -1.0
-            and node.entries.get("nullspace.projector_type") != "none"
-        ):
-            notes.append(
-                "the source takes the null space's damping -1 as it stands: a seventh joint is driven, not damped"
-            )
-    return notes
+        notes.append(f"ROS 2 may refuse these numbers without a decimal point: {files.named(sorted(whole))}")
+    if controller == "franka":
+        notes.append(
+            "written from the source and never compared with a run of it, unlike the models of the other controllers"
+        )
+    return [*notes, *_crisp_notes(node)] if controller == "crisp" else notes
+
+
+def _crisp_notes(node: ControllerNode) -> Iterator[str]:
+    if node.entries.get("use_friction") is True:
+        yield "use_friction: its torque is taken to cancel the joints' friction"
+    if not node.entries.get("use_local_jacobian", False):
+        yield (
+            "use_local_jacobian false: the source's forces act at the base's origin instead of the tip, so that they "
+            "also turn the tip; that coupling is not modelled"
+        )
+    projected = node.entries.get("nullspace.projector_type") != "none"
+    if projected and node.entries.get("nullspace.damping", -1.0) == -1.0:
+        yield (
+            "nullspace.damping -1, the default, is a negative damping in the source: on an arm of seven joints the "
+            "motion that leaves the tip in place is driven, not damped; give a value above 0"
+        )
 
 
 def _has_integer(value: Any) -> bool:
@@ -305,7 +320,7 @@ def judge_law(law: OneAxisLaw, timing: Timing, soft: float | None = None) -> Law
     later = law.loop(timing.later())
     if timing.delay * timing.rate > MAX_PROVED_TICKS:
         return LawVerdict(ranges, None, f"a delay of more than {MAX_PROVED_TICKS} ticks: eigenvalues alone")
-    both = _common([list(ranges), stable_ranges(later)])
+    both = _common([ranges, stable_ranges(later)])
     if not both or runs_away_in_free_motion(later):
         return LawVerdict(ranges, None, "unstable with one tick more of delay: nothing is proved")
     low, high = both[0]
@@ -331,10 +346,7 @@ def _unstable(law: OneAxisLaw, timing: Timing) -> str:
         and timing.delay
         and not timing.sensor
     ):
-        return (
-            "unstable: behind a position interface the solver starts at the measured position, so that a motion which "
-            "is late by n ticks repeats every n ticks"
-        )
+        return f"unstable: {REPEATED_MOTION}; command velocities, or make the measured position follow within a tick"
     return "unstable in free motion or on every surface that was scanned"
 
 
@@ -345,7 +357,15 @@ def _overshoot(law: Law | None, timing: Timing, surfaces: Range | None, *, stabl
     return largest if largest < float("inf") else None
 
 
-def _common(families: Iterable[list[Range]]) -> list[Range]:
+def _common_ranges(laws: list[tuple[Sequence[Range], Range | None]]) -> tuple[list[Range], Range | None]:
+    """Ranges on which all laws are stable, and the one on which all are proved; none without a law."""
+    if not laws:
+        return [], None
+    proved = _common([[proved] if proved else [] for _, proved in laws])
+    return _common([ranges for ranges, _ in laws]), proved[0] if proved else None
+
+
+def _common(families: Iterable[Sequence[Range]]) -> list[Range]:
     """Intervals that lie in an interval of every family, the softest first."""
     result = [SCANNED_STIFFNESS]
     for ranges in families:
@@ -354,10 +374,10 @@ def _common(families: Iterable[list[Range]]) -> list[Range]:
     return result
 
 
-def _covers(ranges: list[Range], surfaces: Range | None) -> bool:
-    if surfaces is None:
-        return bool(ranges)
-    return any(low <= surfaces[0] and surfaces[1] <= high for low, high in ranges)
+def _covers(proved: Range | None, surfaces: Range | None) -> bool:
+    if proved is None or surfaces is None:
+        return proved is not None
+    return proved[0] <= surfaces[0] and surfaces[1] <= proved[1]
 
 
 def _first_unstable(headline: Range | None) -> float | None:
@@ -389,6 +409,6 @@ def _correct(file: ControllerFile, request: ControllerRequest, path: Path) -> tu
             if law is None:
                 continue
             verdict = judge_law(law, timing, request.surfaces[0])
-            if not _covers([verdict.proved] if verdict.proved else [], request.surfaces):
+            if not _covers(verdict.proved, request.surfaces):
                 raise CorrectionError("the corrected numbers could not be proved when they were read back")
     return {".".join(name): value for name, value in changes.items()}, text

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from io import StringIO
 from math import sqrt
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.certify.controller_file import AXES, flatten
 from palpate.certify.discrete_loop import overshoot, runs_away_in_free_motion
 from palpate.certify.upstream_laws import Admittance, CartesianImpedance, ForwardDynamics, Timing
 
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
     from palpate.arrays import Array
     from palpate.certify.controller_file import AxisLaw, ControllerFile, ControllerNode, Law
 
+REPEATED_MOTION = (
+    "with a position interface the solver starts each tick at the measured position, so that a motion which is "
+    "measured n ticks late is repeated every n ticks"
+)
 MAX_OVERSHOOT = 0.08
 """Overshoot of a corrected loop on the surfaces that are tried; 10 % are promised on those between."""
 SURFACES_TRIED = 17
@@ -25,9 +30,8 @@ SPARE = 1.3
 NO_SETTING = (
     "no numbers were found that this rule can run at this rate and that overshoot by at most 10 % there"
 )
-
-
-AnyLaw = TypeVar("AnyLaw", Admittance, CartesianImpedance)
+FRANKA_ENTRY = "translational_stiffness"
+"""The one entry of Franka's example: its damping follows."""
 
 
 class CorrectionError(Exception):
@@ -57,49 +61,43 @@ def correct_node(
     Raises:
         CorrectionError: there are none; its text says why.
     """
-    acceptable = {axis: law is None or is_acceptable(law, timing, surfaces) for axis, law, _ in laws}
-    if all(acceptable.values()):
-        return {}
-    kind = type(next(law for _, law, _ in laws if law is not None))
-    if kind is Admittance:
-        return _correct_admittance(node, laws, timing, surfaces, acceptable)
-    if kind is ForwardDynamics:
-        return _correct_forward_dynamics(node, laws, timing, surfaces)
-    return _correct_impedance(node, laws, timing, surfaces, acceptable)
-
-
-def _first(
-    candidates: Iterator[AnyLaw], timing: Timing, surfaces: tuple[float, float], reason: str
-) -> AnyLaw:
-    for law in candidates:
-        if is_acceptable(law, timing, surfaces):
-            return law
-    raise CorrectionError(f"{NO_SETTING}: {reason}")
-
-
-def _correct_admittance(
-    node: ControllerNode,
-    laws: list[AxisLaw],
-    timing: Timing,
-    surfaces: tuple[float, float],
-    acceptable: dict[str, bool],
-) -> dict[str, Any]:
-    lists = {
-        name: [float(value) for value in node.entries[f"admittance.{name}"]]
-        for name in ("mass", "stiffness", "damping_ratio")
+    wrong = {
+        axis: law for axis, law, _ in laws if law is not None and not is_acceptable(law, timing, surfaces)
     }
-    for i, (axis, law, _) in enumerate(laws):
-        if acceptable[axis]:
-            continue
-        assert isinstance(law, Admittance)
+    if any(isinstance(law, ForwardDynamics) for law in wrong.values()):
+        return _correct_forward_dynamics(node, laws, timing, surfaces)
+    changes: dict[str, Any] = {}
+    for axis, law in wrong.items():
+        better = _first_acceptable(law, axis, node, timing, surfaces)
+        if isinstance(better, CartesianImpedance) and FRANKA_ENTRY in node.entries:
+            changes[FRANKA_ENTRY] = better.stiffness
+        elif isinstance(better, CartesianImpedance):
+            changes[f"task.d_pos_{axis}"] = better.damping
+        else:
+            for name in ("mass", "stiffness", "damping_ratio"):
+                entry = f"admittance.{name}"
+                values = changes.setdefault(entry, [float(value) for value in node.entries[entry]])
+                values[AXES.index(axis)] = getattr(better, name)
+    return changes
+
+
+def _first_acceptable(
+    law: Law, axis: str, node: ControllerNode, timing: Timing, surfaces: tuple[float, float]
+) -> Any:
+    if isinstance(law, Admittance):
+        candidates: Iterator[Law] = _admittances(law, timing, surfaces)
         reason = (
             f"along {axis}, h D/M must stay below 2, and the delay and the filter ask for a D of about their lag "
             "times the stiffness, which settles too slowly on the softest surface"
         )
-        better = _first(_admittances(law, timing, surfaces), timing, surfaces, reason)
-        for name, values in lists.items():
-            values[i] = getattr(better, name)
-    return {f"admittance.{name}": values for name, values in lists.items()}
+    else:
+        assert isinstance(law, CartesianImpedance)
+        candidates = _impedances(law, follows_stiffness=FRANKA_ENTRY in node.entries)
+        reason = "the torque's delay and the tick bound the damping, and the arm's mass swings on the stiffest surface"
+    for better in candidates:
+        if is_acceptable(better, timing, surfaces):
+            return better
+    raise CorrectionError(f"{NO_SETTING}: {reason}")
 
 
 def _admittances(law: Admittance, timing: Timing, surfaces: tuple[float, float]) -> Iterator[Admittance]:
@@ -131,41 +129,18 @@ def _correct_forward_dynamics(
         ]
         if all(is_acceptable(law, timing, surfaces) for law in dict.fromkeys(scaled)):
             return {"solver.error_scale": smaller}
-    raise CorrectionError(
-        f"{NO_SETTING}: no smaller error_scale helps" + (
-            "; behind a position interface the solver starts at the measured position, so that a motion which is late "
-            "by n ticks repeats every n ticks, whatever the gain"
-            if timing.interface == "position"
-            else ""
-        )
-    )  # fmt: skip
+    why = f"; {REPEATED_MOTION}, whatever the gain" if timing.interface == "position" else ""
+    raise CorrectionError(f"{NO_SETTING}: no smaller error_scale helps{why}")
 
 
-def _correct_impedance(
-    node: ControllerNode,
-    laws: list[AxisLaw],
-    timing: Timing,
-    surfaces: tuple[float, float],
-    acceptable: dict[str, bool],
-) -> dict[str, Any]:
-    changes = {}
-    reason = (
-        "the torque's delay and the tick bound the damping, and the arm's mass swings on the stiffest surface"
-    )
-    for axis, law, _ in laws:
-        if acceptable[axis]:
-            continue
-        assert isinstance(law, CartesianImpedance)
-        if "translational_stiffness" in node.entries:
-            tried = (law._replace(stiffness=k, damping=2.0 * sqrt(k)) for k in range(400, 0, -5))
-            better = _first(iter(tried), timing, surfaces, reason)
-            changes["translational_stiffness"] = float(better.stiffness)
-        else:
-            near = law.damping * np.geomspace(1e-2, 1e3, 101) if law.damping else np.geomspace(1.0, 5e3, 101)
-            near = near[np.argsort(abs(np.log(near / near[40])))]
-            tried = (law._replace(damping=_rounded(d)) for d in near if d <= 5e3)
-            changes[f"task.d_pos_{axis}"] = _first(iter(tried), timing, surfaces, reason).damping
-    return changes
+def _impedances(law: CartesianImpedance, *, follows_stiffness: bool) -> Iterator[CartesianImpedance]:
+    """Impedances of other dampings, the nearest first; softer ones where the damping follows the stiffness."""
+    if follows_stiffness:
+        yield from (law._replace(stiffness=float(k), damping=2.0 * sqrt(k)) for k in range(400, 0, -5))
+        return
+    near = law.damping * np.geomspace(1e-2, 1e3, 101) if law.damping else np.geomspace(1.0, 5e3, 101)
+    near = near[np.argsort(abs(np.log(near / near[40])))]
+    yield from (law._replace(damping=_rounded(d)) for d in near if d <= 5e3)
 
 
 def _rounded(value: float) -> float:
@@ -188,8 +163,6 @@ def with_changes(file: ControllerFile, changes: dict[tuple[str, ...], Any]) -> d
             for other in [full for full in left if full[: len(name)] == name and full not in present]:
                 result[".".join(other[len(name) :])] = left.pop(other)
         return result
-
-    from palpate.certify.controller_file import flatten
 
     present = set(flatten(file.content, ""))
     content: dict[str, Any] = rebuild(file.content, ())

@@ -32,12 +32,32 @@ SECTIONS = {
     "franka": ("translational_stiffness",),
 }
 """Words of which a parameter file of a controller has one."""
+PLUGINS = {
+    "ros2-admittance": ("admittance_controller/",),
+    "fzi": (
+        "cartesian_force_controller/",
+        "cartesian_compliance_controller/",
+        "cartesian_motion_controller/",
+        "position_controllers/Cartesian",
+        "velocity_controllers/Cartesian",
+    ),
+    "crisp": ("crisp_controllers/",),
+    "franka": ("franka_example_controllers/",),
+}
+"""Beginnings of the types under which the sources that are modelled are loaded."""
 UNPUBLISHED = {
     "ur": "force_mode's law is not published: damping and gain_scaling have no units in its manual; log a press, and "
     "use palpate identify and palpate tune",
 }
 AXES = ("x", "y", "z")
 FRANKA_RATE = 1000.0
+NO_TORQUE = (
+    "k_pos 0 makes the damping 0 too: no torque acts along it, and contact is neither damped nor driven"
+)
+DRIVEN = (
+    "with projector_type none is a negative damping of every joint, and nothing else acts: the arm runs away, in "
+    "contact as in free motion, unless the friction of its joints holds it"
+)
 Law = Admittance | ForwardDynamics | CartesianImpedance
 
 
@@ -48,10 +68,11 @@ class ControllerNode:
         where: file and node, for messages.
         place: words of the node's name in the file; empty for a file of one controller.
         entries: values by name.
+        plugin: type under which the controller is loaded; "" if the file does not say.
     """
 
-    def __init__(self, where: str, place: tuple[str, ...], entries: dict[str, Any]):
-        self.where, self.place, self.entries = where, place, entries
+    def __init__(self, where: str, place: tuple[str, ...], entries: dict[str, Any], plugin: str = ""):
+        self.where, self.place, self.entries, self.plugin = where, place, entries, plugin
         self.used: set[str] = set()
         self.defaults: dict[str, Any] = {}
 
@@ -125,7 +146,7 @@ class ControllerNode:
 
 
 class NoForceError(InputError):
-    """A controller that does not measure the force: it is passed over where the file has another."""
+    """A controller that does not measure the force, or of another project: it is passed over beside others."""
 
 
 class AxisLaw(NamedTuple):
@@ -197,12 +218,14 @@ def find_controllers(content: dict[str, Any], path: str, controller: str) -> Con
             other[name] = value
         else:
             inside.setdefault(place, {})[".".join(name[len(place) :])] = value
+    types = {name[-2].strip("/"): value for name, value in other.items() if name[-1] == "type" and name[1:]}
     nodes = []
     for place, values in inside.items():
         if any(name.split(".")[0] in section for name in values):
             label = ".".join(place)
             where = printable(f"{path}, {label}") if len(inside) > 1 and label else str(path)
-            nodes.append(ControllerNode(where, place, values))
+            plugin = values.get("type", types.get(label.rpartition("/")[2], ""))
+            nodes.append(ControllerNode(where, place, values, str(plugin)))
         else:
             other |= {(*place, *name.split(".")): value for name, value in values.items()}
     if not nodes:
@@ -211,7 +234,7 @@ def find_controllers(content: dict[str, Any], path: str, controller: str) -> Con
                 f"{path}: pid_gains is of an older controller; the source that is modelled reads pd_gains"
             )
         raise InputError(
-            f"{path}: no settings of {controller}, which has {' or '.join(section)}; name its file"
+            f"{path}: no settings of {controller}, whose files have entries named {' or '.join(section)}"
         )
     rates = {value for name, value in other.items() if name[-1] == "update_rate" and _is_rate(value)}
     rate = float(rates.pop()) if len(rates) == 1 else None
@@ -229,6 +252,18 @@ def node_rate(node: ControllerNode, shared: float | None) -> float | None:
         return shared
     rate = node.number("update_rate", None, 0.0, MAX_RATE)
     return rate if rate > 0.0 else shared
+
+
+def check_plugin(node: ControllerNode, controller: str) -> None:
+    """Refuse a controller of the same entries that another source is loaded for.
+
+    Raises:
+        NoForceError: its type is of another project.
+    """
+    if node.plugin and not node.plugin.startswith(PLUGINS[controller]):
+        raise NoForceError(
+            f"{node.where}: its type is {shown(node.plugin)}, whose source is not the one that is modelled"
+        )
 
 
 def _is_rate(value: Any) -> bool:
@@ -320,7 +355,6 @@ def crisp_axes(node: ControllerNode, mass: float) -> list[AxisLaw]:
     """
     if node.flag("stop_commands", False):
         raise InputError(f"{node.where}: stop_commands true, so that the controller commands no torque")
-    _refuse_joint_torques(node)
     operational = node.flag("use_operational_space", False)
     axes = []
     for axis in AXES:
@@ -328,21 +362,32 @@ def crisp_axes(node: ControllerNode, mass: float) -> list[AxisLaw]:
         d = node.number(f"task.d_pos_{axis}", -1.0, -1.0, 5000.0)
         d = d if d > 0.0 else 2.0 * k**0.5
         law = CartesianImpedance(k, d, mass, operational) if k > 0.0 or d > 0.0 else None
-        reason = "" if law else f"task.k_pos_{axis} 0 makes its damping 0 too: no torque acts along it"
-        axes.append(AxisLaw(axis, law, reason))
-    return axes
+        axes.append(AxisLaw(axis, law, "" if law else NO_TORQUE))
+    return _with_joint_torques(node, axes)
 
 
-def _refuse_joint_torques(node: ControllerNode) -> None:
+def _with_joint_torques(node: ControllerNode, axes: list[AxisLaw]) -> list[AxisLaw]:
+    """The axes, if no torques act in joint space; with the reason if those are sure to drive the arm.
+
+    A negative damping W of all joints alone, M q'' = W q' - K q, has poles whose sum is the trace of W/M, above 0.
+    """
     projector = node.value("nullspace.projector_type", "kinematic")
     stiffness = node.number("nullspace.stiffness", 1.0, 0.0, 500.0)
     damping = node.number("nullspace.damping", -1.0, -1.0, 500.0)
     weights = [value for name, value in node.entries.items() if name.startswith("nullspace.weights.")]
-    if projector == "none" and (stiffness or damping) and (not weights or any(w != 0 for w in weights)):
-        raise InputError(
-            f"{node.where}: nullspace.projector_type none with stiffness {stiffness:g} and damping {damping:g} gives "
-            "torques in joint space, which act along every axis by the arm's Jacobian; that is not modelled"
-        )
+    if projector != "none" or not (stiffness or damping) or (weights and not any(weights)):
+        return axes
+    turns = any(
+        node.entries.get(f"task.k_rot_{axis}", 30.0) != 0
+        or node.entries.get(f"task.d_rot_{axis}", -1) not in (-1, 0)
+        for axis in AXES
+    )
+    if damping < 0.0 and not (stiffness or turns or any(axis.law for axis in axes)):
+        return [axis._replace(reason=f"nullspace.damping {damping:g} {DRIVEN}") for axis in axes]
+    raise InputError(
+        f"{node.where}: nullspace.projector_type none with stiffness {stiffness:g} and damping {damping:g} gives "
+        "torques in joint space, which act along every axis by the arm's Jacobian; that is not modelled"
+    )
 
 
 def franka_axes(node: ControllerNode, mass: float) -> list[AxisLaw]:

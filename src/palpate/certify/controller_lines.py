@@ -1,4 +1,4 @@
-"""Lines of a terminal about another project's controller: a sentence of what is claimed, then the axes."""
+"""Lines of a terminal about another project's controller: what is claimed, then the axes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def answer_lines(answer: dict[str, Any], written: Path | None) -> list[str]:
     ]
     lines += [f"Passed over: {text}." for text in answer["passed_over"]]
     if answer["unused"]:
-        lines.append(f"Not used, of the file: {named(answer['unused'])}.")
+        lines.append(f"Entries of the file that the model does not use: {named(answer['unused'])}.")
     if answer["corrected"] is not None:
         values = ", ".join(f"{shown(name)} {shown(value)}" for name, value in answer["corrected"].items())
         place = f"written to {written}" if written is not None else "--out FILE.yaml writes them"
@@ -40,18 +40,25 @@ def answer_lines(answer: dict[str, Any], written: Path | None) -> list[str]:
 
 
 def _claim(answer: dict[str, Any]) -> str:
-    """One sentence with what is proved, what is only computed, and what is not modelled."""
+    """What is proved, what is only computed, and what is not modelled."""
     proved, exact = answer["proved"]["stiffness"], answer["exact"]["stiffness"]
-    stable = f"stable on {span(exact)}" if exact else "not stable on any surface"
+    model = (
+        "The model is one axis that presses a spring without damping. Not modelled: "
+        f"{answer['not_modelled']}."
+    )
+    axes = [axis for node in answer["controllers"] for axis in node["axes"].values()]
+    if all(axis["ranges"] is None for axis in axes):
+        reasons = dict.fromkeys(axis["reason"] for axis in axes)
+        return f"Nothing to prove, because no axis has a force loop: {'; '.join(reasons)}. {model}"
     claim = (
-        f"Proved stable in exact arithmetic on {span(proved)}, for the delay and for one tick more"
+        f"Proved stable on surfaces of {span(proved)}, in exact arithmetic, for the delay and for one tick more"
         if proved
         else "Not proved"
     )
+    stable = f"stable on {span(exact)}" if exact else "not stable on any surface"
     return (
-        f"{claim}; by eigenvalues alone, at {answer['exact']['points_per_decade']} stiffnesses a decade from 1 N/m to "
-        f"10 MN/m, {stable}: this is one axis on springs without damping, and not modelled are "
-        f"{answer['not_modelled']}."
+        f"{claim}. Computed without a proof, by eigenvalues at {answer['exact']['points_per_decade']} stiffnesses a "
+        f"decade from 1 N/m to 10 MN/m: {stable}. {model}"
     )
 
 
@@ -73,10 +80,10 @@ def _node_lines(node: dict[str, Any]) -> Iterator[str]:
     if late:
         exact = " and ".join(span(r) for r in late["exact"]) or "no surface"
         proved = f", proved on {span(late['proved'])}" if late["proved"] else ""
-        yield f"  if the arm follows within a tick and only the force is late: stable on {exact}{proved}"
+        yield f"  If the arm follows within a tick and only the force is late: stable on {exact}{proved}."
     if node["left_out"]:
         values = ", ".join(f"{name} {shown(value)}" for name, value in node["left_out"].items())
-        yield f"  Left out of the file, and taken as: {values}."
+        yield f"  Not in the file, taken as: {values}."
     for note in node["notes"]:
         yield f"  Note: {note}."
 

@@ -25,7 +25,6 @@ POINTS_PER_DECADE = 80
 """An island of stability or of instability wider than 3 % holds a point of the scan."""
 STABILITY_MARGIN = 1e-9
 """Distance of the eigenvalues from the unit circle: their rounding error where two of them nearly coincide."""
-MAX_STATES = 400
 PROVED_FRACTION = 0.99
 """Fraction of the edge up to which a proof is tried; nearer to the edge its cells become too many."""
 MAX_CELLS = 600
@@ -126,17 +125,10 @@ def stable_ranges(loop: LoopOnSpring) -> list[tuple[float, float]]:
     count = round(np.log10(high / low) * POINTS_PER_DECADE) + 1
     grid = np.geomspace(low, high, count)
     stable = growth(loop, grid) < 1.0 - STABILITY_MARGIN
-    ranges: list[tuple[float, float]] = []
-    begin = low if stable[0] else None
-    for i in range(1, count):
-        if stable[i] != stable[i - 1]:
-            edge = _edge(loop, float(grid[i - 1]), float(grid[i]), rising=bool(stable[i]))
-            if begin is None:
-                begin = edge
-            else:
-                ranges.append((begin, edge))
-                begin = None
-    return ranges if begin is None else [*ranges, (begin, high)]
+    changes = np.flatnonzero(stable[1:] != stable[:-1])
+    edges = [_edge(loop, float(grid[i]), float(grid[i + 1]), rising=bool(stable[i + 1])) for i in changes]
+    ends = [*[low][: int(stable[0])], *edges, *[high][: int(stable[-1])]]
+    return list(zip(ends[::2], ends[1::2], strict=True))
 
 
 def _edge(loop: LoopOnSpring, low: float, high: float, *, rising: bool) -> float:

@@ -9,13 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from palpate.certify.controller_answer import LawVerdict, judge_law
+from palpate.certify.controller_answer import LawVerdict, check_timing, judge_law
 from palpate.certify.discrete_loop import AffineLoop
 from palpate.certify.upstream_laws import Timing, law_signals
 from palpate.errors import InputError
 
 MAX_ORDER = 40
-MAX_DELAY_TICKS = 200
 
 
 class LinearLaw(NamedTuple):
@@ -70,10 +69,7 @@ def certify_law(
         )
     if interface not in ("position", "velocity"):
         raise InputError(f"interface must be 'position' or 'velocity', got {interface!r}")
-    if not 1.0 <= rate <= 1e5 or not 0.0 <= delay * rate <= MAX_DELAY_TICKS:
-        raise InputError(
-            f"rate must be 1 to 1e5 Hz and delay up to {MAX_DELAY_TICKS} ticks, got {rate:g}, {delay:g}"
-        )
+    check_timing(rate, delay)
     first = Fraction(denominator[0])
     padded = [0.0] * (len(denominator) - len(numerator)) + [*numerator]
     law = LinearLaw(

@@ -8,12 +8,15 @@ cosines); that of kappa s is (s' + c')/2, at most (1/6 + 1/2)/2 = 1/3.
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import lru_cache
 from math import ceil, factorial, isqrt
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from palpate.arrays import Array
 
 BITS = 520
@@ -48,32 +51,18 @@ class TorqueSpringLoop(NamedTuple):
 
     def matrices(self, stiffness: Array) -> Array:
         """A(K) for each stiffness [N/m]; shape (m, n, n)."""
-        return self._system(stiffness)[..., :-1]
+        return self._float_system(stiffness)[..., :-1]
 
     def inputs(self, stiffness: Array) -> Array:
         """Change of the state by one newton of commanded force, for each stiffness; shape (m, n)."""
-        return self._system(stiffness)[..., -1]
+        return self._float_system(stiffness)[..., -1]
 
     def exact_matrix(self, stiffness: Fraction) -> Any:
         """A(K) in fractions, each within 2^-400 of the true element; shape (n, n)."""
         mass, period = Fraction(self.mass), Fraction(self.period)
-        swing, late = (_oscillation(stiffness, mass, t) for t in (period, period * (1 - Fraction(self.part))))
-        newer, older = late[1], [whole - rest for whole, rest in zip(swing[1], late[1], strict=True)]
-        n = self.whole + 3
-        signals = [[Fraction(int(i == j)) for j in range(n)] for i in range(n)]
-        command = [-Fraction(self.feedback[0]), -Fraction(self.feedback[1]), *[Fraction(0)] * (n - 2)]
-        commands = [command, *signals[2:]]
-        moved = [
-            [
-                swing[0][i][0] * signals[0][j]
-                + swing[0][i][1] * signals[1][j]
-                + newer[i] * commands[self.whole][j]
-                + older[i] * commands[self.whole + 1][j]
-                for j in range(n)
-            ]
-            for i in range(2)
-        ]
-        return np.array([*moved, *commands[:-1]])
+        times = (period, period * (1 - Fraction(self.part)))
+        (swing, whole), (_, rest) = (_oscillation(stiffness, mass, time) for time in times)
+        return self._system(np.array(swing), np.array(whole), np.array(rest), Fraction)[:, :-1]
 
     def bend(self, low: float, high: float) -> Array:
         """Bounds of the distance of A(K) from the chord between the ends, for each element; shape (n, n).
@@ -97,19 +86,30 @@ class TorqueSpringLoop(NamedTuple):
         bounds[:2] += np.outer(forced(t) + rest, commands[self.whole + 1])
         return bounds * ((high - low) ** 2 / 8.0 * (1.0 + 1e-9))
 
-    def _system(self, stiffness: Array) -> Array:
-        n = self.whole + 3
-        signals = np.eye(n, n + 1)
-        command = -self.feedback[0] * signals[0] - self.feedback[1] * signals[1]
-        command[-1] = 1.0
-        commands = [command, *signals[2:]]
+    def _float_system(self, stiffness: Array) -> Array:
         swing, whole = self._swing(stiffness, self.period)
         _, rest = self._swing(stiffness, self.period * (1.0 - self.part))
-        system = np.zeros((len(stiffness), n, n + 1))
-        system[:, :2] = np.einsum("mij,jk->mik", swing, signals[:2])
-        system[:, :2] += rest[:, :, None] * commands[self.whole]
-        system[:, :2] += (whole - rest)[:, :, None] * commands[self.whole + 1]
-        system[:, 2:] = np.array(commands[:-1])
+        return self._system(swing, whole, rest, float)
+
+    def _system(self, swing: Array, whole: Array, rest: Array, number: Callable[[float], Any]) -> Array:
+        """Next state from the state and, in the last column, one newton more; in numbers of one kind.
+
+        Args:
+            swing: position and velocity after a tick from those before it; shape (..., 2, 2).
+            whole: the same from a constant force of one newton; shape (..., 2).
+            rest: that of the part of the tick in which the newer command acts.
+            number: kind of number.
+        """
+        n = self.whole + 3
+        signals = np.eye(n, n + 1, dtype=int).astype(swing.dtype)
+        command = -number(self.feedback[0]) * signals[0] - number(self.feedback[1]) * signals[1]
+        command[-1] = number(1.0)
+        commands = [command, *signals[2:]]
+        system = np.zeros((*swing.shape[:-2], n, n + 1), swing.dtype)
+        system[..., :2, :] = swing @ signals[:2]
+        system[..., :2, :] += rest[..., None] * commands[self.whole]
+        system[..., :2, :] += (whole - rest)[..., None] * commands[self.whole + 1]
+        system[..., 2:, :] = np.array(commands[:-1])
         return system
 
     def _swing(self, stiffness: Array, time: float) -> tuple[Array, Array]:
@@ -121,6 +121,7 @@ class TorqueSpringLoop(NamedTuple):
         return swing.transpose(2, 0, 1), forced.T
 
 
+@lru_cache(64)
 def _oscillation(stiffness: Fraction, mass: Fraction, time: Fraction) -> tuple[list[list[Any]], list[Any]]:
     """Position and velocity after a time from those before it, and from a constant force of 1 N; in fractions."""
     kappa = stiffness * time**2 / mass
@@ -131,11 +132,15 @@ def _oscillation(stiffness: Fraction, mass: Fraction, time: Fraction) -> tuple[l
 
 def _series(kappa: Fraction, first: int) -> Fraction:
     """Sum of (-kappa)^j/(2 j + first)!, with an error below 2^-500: its terms alternate, and fall after a while."""
-    unit = 1 << (BITS + 2 * isqrt(ceil(kappa)))
-    total = term = Fraction(1, factorial(first))
+    bits = BITS + 2 * isqrt(ceil(kappa))
+    total = term = (1 << bits) // factorial(
+        first
+    )  # in units of 2^-bits: whole numbers are faster than fractions
+    up, down = -kappa.numerator, kappa.denominator
     j = 1
     while term or (2 * j + first) ** 2 <= kappa:
-        term = Fraction(round(term * -kappa / ((2 * j + first - 1) * (2 * j + first)) * unit), unit)
+        divisor = down * (2 * j + first - 1) * (2 * j + first)
+        term = (2 * term * up + divisor) // (2 * divisor)
         total += term
         j += 1
-    return total
+    return Fraction(total, 1 << bits)
