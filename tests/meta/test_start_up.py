@@ -70,7 +70,7 @@ def test_scipy_signal_and_stats_are_imported_by_no_short_command(root):
         )
     }
     assert users <= {
-        "contact_frame/slide_log.py", "contact_frame/tool_payload.py", "maps/gaussian_process.py", "maps/stiffness_map.py", "studies/plan.py",
+        "contact_frame/slide_log.py", "contact_frame/tool_payload.py", "studies/plan.py",
     }  # fmt: skip
 
 

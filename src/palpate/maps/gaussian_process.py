@@ -16,7 +16,7 @@ from scipy.linalg import LinAlgError, cholesky, eigh
 from scipy.linalg.lapack import dtrtri
 from scipy.optimize import brentq, minimize
 from scipy.spatial.distance import cdist, pdist, squareform
-from scipy.stats import invgamma, norm
+from scipy.special import ndtr, ndtri
 
 from palpate.arrays import Array, Mask
 
@@ -36,7 +36,7 @@ SMALL = 32
 """Half of the rows of a matrix that LAPACK factors at once: its threads start at 64."""
 LEVEL = 0.05
 """Fraction of values outside their intervals."""
-Z95 = float(norm.isf(LEVEL / 2.0))
+Z95 = -float(ndtri(LEVEL / 2.0))
 """Half-width of a normal distribution's central 95 % over its standard deviation."""
 ROUNDING = 1e-3
 """Fraction of the variance that rounding to single precision may take: a twentieth of a per cent of an interval."""
@@ -311,7 +311,7 @@ class GaussianProcess:
         allowed = LEVEL * (normal + len(deviations) + 1.0) - 1.0
 
         def excess(z: float) -> float:
-            return float(2.0 * normal * norm.sf(z) + np.sum(deviations > z)) - allowed
+            return float(2.0 * normal * ndtr(-z) + np.sum(deviations > z)) - allowed
 
         return max(Z95, float(brentq(excess, 0.0, max(5.0, *deviations))))
 
@@ -380,12 +380,12 @@ def student95(errors: Array, field: Array, noise: Array) -> float:
     evidence -= 0.5 * np.tile(np.log(scales) / 0.5, (len(FREEDOMS), 1)) ** 2
     posterior = np.exp(evidence - evidence.max()).sum(axis=1)
     mixture = posterior / posterior.sum() @ of_field
-    return float(brentq(lambda z: 2.0 * mixture @ norm.sf(z / np.sqrt(s)) - LEVEL, 0.0, 100.0))
+    return float(brentq(lambda z: 2.0 * mixture @ ndtr(-z / np.sqrt(s)) - LEVEL, 0.0, 100.0))
 
 
 def _mixing_weights(s: Array, shape: Array, scale: Array) -> Array:
     """Weights of the factors s under inverse gamma distributions, a row of sum 1 each."""
-    weights = s * invgamma.pdf(s, shape, scale=scale)
+    weights = np.exp(-shape * np.log(s) - scale / s)
     return np.asarray(weights.reshape(-1, len(s)) / weights.sum(axis=-1).reshape(-1, 1))
 
 

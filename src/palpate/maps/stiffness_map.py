@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.special import ndtr
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from palpate._jit.typed_edge import cast_array, cast_number
 from palpate.arrays import Array
@@ -87,7 +86,7 @@ class StiffnessPrediction:
 
     def exceeds(self, threshold: float) -> Array:
         """Probability that the stiffness is above a threshold [N/m] (n,)."""
-        return np.asarray(norm.sf(_log_threshold(threshold), self.mean, np.hypot(self.std, self.common)))
+        return np.asarray(ndtr((self.mean - _log_threshold(threshold)) / np.hypot(self.std, self.common)))
 
     def _interval(self, half: Array) -> Array:
         return _exp(self.mean[:, None] + np.outer(half, [-1.0, 1.0]))
@@ -229,7 +228,7 @@ class StiffnessMap:
         weights = np.ones(len(mean))
         if stiffer_than is not None:
             std = np.sqrt(np.maximum(variance, 1e-12))
-            density = norm.pdf(_log_threshold(stiffer_than), mean, std)
+            density = np.exp(-0.5 * ((_log_threshold(stiffer_than) - mean) / std) ** 2) / std
             weights = 1.0 + density / max(float(density.mean()), 1e-300)
         covariance = self.process.likeliest.covariance(among)
         steps = list(islice(choose(covariance, weights, self._noise), count))
@@ -262,7 +261,7 @@ class StiffnessMap:
     def disagreeing(self) -> list[int]:
         """Presses that their neighbours contradict: of such a deviation n presses have one in 20 maps by chance."""
         errors, variance = self.process.likeliest.leave_one_out()
-        bound = norm.ppf(1.0 - 0.025 / len(self))
+        bound = ndtri(1.0 - 0.025 / len(self))
         return [int(i) for i in np.flatnonzero(np.abs(errors) > bound * np.sqrt(variance))]
 
     def grid(self, count: int = 10_000) -> Grid:
