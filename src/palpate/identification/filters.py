@@ -179,8 +179,8 @@ def _butterworth(order: int, cutoff: float) -> tuple[Array, Array]:
     A = cutoff * np.vstack([-np.poly(poles).real[1:], np.eye(order)[:-1]])
     chain = np.zeros((order + 2, order + 2))  # the states, the input and its slope
     chain[:order, :order], chain[0, order], chain[order, order + 1] = A, cutoff, 1.0
-    held = expm(chain)
-    E, step, ramp = held[:order, :order], held[:order, order], held[:order, order + 1]
+    exponential = expm(chain)
+    E, step, ramp = exponential[:order, :order], exponential[:order, order], exponential[:order, order + 1]
     drive, through = step - ramp + E @ ramp, ramp[-1]
     denominator = np.asarray(np.poly(E), float)
     last = np.zeros(order)
