@@ -115,27 +115,23 @@ def test_a_torque_arm_is_proved_and_its_null_space_is_noted():
     assert verdict.holds
     notes = " ".join(verdict.answer["controllers"][0]["notes"])
     assert all(word in notes for word in ("use_friction", "damping -1", "use_local_jacobian false"))
-    franka = certify("translational_stiffness: 200.0\n", "franka", delay=0.002, mass=3.0).answer
-    assert "never compared with a run" in franka["controllers"][0]["notes"][0]
+    franka = certify("translational_stiffness: 200.0\n", "franka", mass=3.0).answer["controllers"][0]
+    assert "never compared with a run" in franka["notes"][0]
 
 
 STILL = "".join(f"task.k_pos_{axis}: 0.0\ntask.k_rot_{axis}: 0.0\n" for axis in "xyz")
 UNDAMPED = "nullspace.projector_type: none\nnullspace.stiffness: 0.0\n"
 
 
-@pytest.mark.parametrize(
-    ("text", "says"), [(STILL, "no torque acts"), (STILL + UNDAMPED, "the arm runs away")]
-)
-def test_an_arm_without_a_force_loop_is_answered_and_not_corrected(text, says):
-    verdict = certify(text, "crisp", rate=1000.0, mass=3.0, surfaces=(1e3, 1e4))
+@pytest.mark.parametrize(("more", "says"), [("", "no torque acts"), (UNDAMPED, "the arm runs away")])
+def test_an_arm_without_a_force_loop_is_answered_and_not_corrected(more, says):
+    verdict = certify(STILL + more, "crisp", rate=1000.0, mass=3.0, surfaces=(1e3, 1e4))
     assert not verdict.holds
     assert verdict.answer["proved"]["stiffness"] is verdict.answer["first_unstable"] is None
     assert verdict.answer["not_corrected_because"] == "no axis has a force loop"
     assert all(says in axis["reason"] for axis in verdict.answer["controllers"][0]["axes"].values())
     claim = answer_lines(verdict.answer, None)[1]
-    assert claim.startswith("Nothing to prove")
-    assert says in claim
-    assert "Not modelled: the other five axes" in claim
+    assert all(part in claim for part in ("Nothing to prove", says, "Not modelled: the other five axes"))
 
 
 def test_controllers_that_do_not_measure_the_force_are_passed_over():

@@ -35,16 +35,13 @@ def test_values_change_in_their_place_and_nothing_else():
     assert file["a"]["ros__parameters"]["admittance"] == {"mass": [3.0, 1e-7], "joint_damping": 5}
     assert file["a"]["ros__parameters"]["name"] == "0x10"
     assert file["b"]["ros__parameters"] == {"admittance.mass": [4.0]}
+    assert "- 4.0\n" in dump({"a": [4.0]})  # a decimal point, which ROS 2 needs
 
 
 def test_an_entry_that_the_file_lacks_is_added_to_its_controller():
     file = changed(NESTED, {("b", "admittance", "stiffness"): [1.0]})
     assert file["b"]["ros__parameters"] == {"admittance.mass": [2.0], "admittance.stiffness": [1.0]}
     assert "admittance.stiffness" not in file["a"]["ros__parameters"]
-
-
-def test_a_whole_number_keeps_its_decimal_point():
-    assert "- 4.0\n" in dump({"a": [4.0]})
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -153,9 +153,8 @@ def test_what_is_not_modelled_is_refused_in_one_line_with_its_reason(tmp_path, c
 
 
 def test_a_controller_of_ros_1_has_its_interface_in_its_type(tmp_path):
-    text = FORCE.replace(
-        "command_interfaces: [velocity]", "type: velocity_controllers/CartesianForceController"
-    )
+    kind = "type: velocity_controllers/CartesianForceController"
+    text = FORCE.replace("command_interfaces: [velocity]", kind)
     assert node_interface(read(tmp_path, text, "fzi").nodes[0]) == "velocity"
 
 

@@ -56,9 +56,7 @@ def test_the_fractions_are_those_of_an_exponential_with_bounds(stiffness, part):
     st.floats(1.0, 1e6), st.floats(1.0001, 3.0), st.floats(0.3, 10.0), st.integers(0, 2), st.floats(0.0, 0.99)
 )
 @settings(max_examples=60)
-def test_between_the_ends_of_a_cell_the_loop_is_off_the_chord_by_less_than_the_bound(
-    low, ratio, mass, whole, part
-):
+def test_in_a_cell_the_loop_is_off_the_chord_by_less_than_the_bound(low, ratio, mass, whole, part):
     loop, high = TorqueSpringLoop((900.0, 40.0), mass, 2e-3, whole, part), low * ratio
     s = np.linspace(0.0, 1.0, 9)
     A = loop.matrices(low + s * (high - low))

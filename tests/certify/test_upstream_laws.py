@@ -33,9 +33,8 @@ def test_the_edge_of_an_admittance_with_joint_damping_alone(rate, interface):
     """z^2 - (2 - h d - h^2 K/M) z + 1 - h d for S = 0, no filter and no delay: by Jury, K < M (4 - 2 h d)/h^2."""
     M, d, h = 0.02, 8.0, 1.0 / rate
     law = Admittance(M, 0.0, 2.8, d, 1.0)
-    assert edge(law.loop(Timing(rate, 0.0, interface))) == pytest.approx(
-        M * (4.0 - 2.0 * h * d) / h**2, rel=1e-6
-    )
+    expected = M * (4.0 - 2.0 * h * d) / h**2
+    assert edge(law.loop(Timing(rate, 0.0, interface))) == pytest.approx(expected, rel=1e-6)
 
 
 def test_the_edge_of_a_force_controller_without_delay():

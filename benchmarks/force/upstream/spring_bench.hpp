@@ -145,7 +145,7 @@ inline double step(
 {
   double peak = 0.0, middle = 0.0, last = 0.0;
   const Tick tick = make();
-  const double push = tick.smallest > 0.0 ? 1e-3 * stiffness * tick.largest : 1.0;
+  const double push = tick.smallest > 0.0 ? 0.03 * stiffness * tick.largest : 1.0;
   run(bench, tick, stiffness, ticks, [&](long) { return push; }, [&](long k, double x) {
     peak = std::max(peak, x);
     last = x;
