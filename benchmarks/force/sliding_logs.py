@@ -52,7 +52,10 @@ def cone_held(found: Identification, log: WipeLog) -> tuple[float, float]:
     assert found.slide is not None
     places = found.slide.values["places"]
     at = np.array([[p[axis] for axis in "xyz"] for p in places])
-    normal, cone = np.array([p["normal"] for p in places]), np.array([p["cone95_deg"] for p in places])
+    normal, cone = (
+        np.array([p["normal"] for p in places]),
+        np.array([p["cone95_deg"] or 180.0 for p in places]),
+    )
     true = log.normal[log.inside][cKDTree(log.place[log.inside]).query(at)[1]]
     off = np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", normal, true), -1.0, 1.0)))
     return float(np.mean(off < cone)), float(np.median(off))

@@ -172,10 +172,8 @@ def table(worlds: int, seed: int, counts: Sequence[int]) -> list[str]:
                     rng = np.random.default_rng([seed, list(KINDS).index(kind), k])
                     surface = world(kind, rng)
                     scores.append(judge(surface, explore(surface, count, rng, goal), rng))
-                row = [
-                    np.mean([getattr(s, name) for s in scores])
-                    for name in ("mean", "next", "error", "overlap")
-                ]
+                names = ("mean", "next", "error", "overlap")
+                row = [np.mean([getattr(s, name) for s in scores]) for name in names]
                 rows.append(
                     f"| {kind} | {goal} | {count} | {100 * row[0]:.1f} % | {100 * row[1]:.1f} % | {row[2]:.3f} | "
                     f"{row[3]:.3f} | {calibration(scores):.3f} |"

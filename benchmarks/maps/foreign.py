@@ -50,11 +50,9 @@ def bumps(places: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     field = np.zeros(len(places))
     for _ in range(rng.integers(4, 15)):
         width = 0.004 * (1.0 + rng.pareto(2.5))
-        field += (
-            0.2
-            * rng.pareto(2.0)
-            * np.exp(-0.5 * (cdist(places, rng.uniform(0.0, SIDE, (1, 2)))[:, 0] / width) ** 2)
-        )
+        height = 0.2 * rng.pareto(2.0)
+        far = cdist(places, rng.uniform(0.0, SIDE, (1, 2)))[:, 0]
+        field += height * np.exp(-0.5 * (far / width) ** 2)
     return np.minimum(field, 3.0)
 
 

@@ -414,5 +414,12 @@ def test_what_stands_there_is_not_replaced_unasked(capsys, elsewhere):
     assert (elsewhere / "gains.toml").read_text() == "mine"
 
 
+def test_bounds_of_the_force_state_their_condition(capsys, elsewhere):
+    assert main(["tune", *RANGE, "--slide"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "on springs), settles" in text
+    assert "on springs no normal, right or wrong" in text
+
+
 def test_a_number_of_a_slide_without_a_slide_is_refused(capsys, elsewhere):
     assert "--mu-max is for a slide; add --slide" in refused(capsys, "tune", *RANGE, "--mu-max", "0.8")

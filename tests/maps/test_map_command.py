@@ -10,10 +10,8 @@ import pytest
 from matplotlib.colors import to_hex
 
 from palpate.cli import main
-from palpate.errors import InputError
 from palpate.logs.tables.parquet import write_record
 from palpate.maps.phantom import Phantom, PhantomLump, load_phantom
-from palpate.maps.presses import Presses, merge_presses
 from palpate.maps.report import SHADES, scale
 from palpate.records import Record
 from report.test_look import ALL_GROUNDS, contrast
@@ -100,12 +98,7 @@ def test_logs_of_presses_are_identified_and_placed(tmp_path, capsys):
     words = [*COLUMNS, "--place", "x_mm:mm,y_mm:mm"]
     assert main(["map", str(tmp_path), *words, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
-    assert [(row["x"], row["y"]) for row in answer["places"]] == [
-        (0.0, 0.0),
-        (0.02, 0.0),
-        (0.0, 0.02),
-        (0.02, 0.02),
-    ]
+    assert [(row["x"], row["y"]) for row in answer["places"]] == [(0, 0), (0.02, 0), (0, 0.02), (0.02, 0.02)]
     assert answer["places"][0]["stiffness"] == pytest.approx(5240.0, rel=0.02)
 
 
@@ -204,10 +197,8 @@ def test_a_bad_phantom_is_one_line(tmp_path, capsys, line):
     key = line.split(" =", maxsplit=1)[0]
     rest = [own for own in PHANTOM.splitlines() if not own.startswith(f"{key} =")]
     path.write_text("\n".join([line, *rest]), encoding="utf-8")
-    assert (
-        main(["press", "--arm", "ur5e", "--force", "5:N", "--map", str(path), "--out", str(tmp_path / "o")])
-        == 2
-    )
+    words = ["press", "--arm", "ur5e", "--force", "5:N", "--map", str(path), "--out", str(tmp_path / "o")]
+    assert main(words) == 2
     error = capsys.readouterr().err
     assert str(path) in error
     assert error.count("\n") == 1
@@ -225,20 +216,8 @@ def test_an_arm_maps_a_phantom(tmp_path, capsys):
     path = tmp_path / "phantom.toml"
     path.write_text(PHANTOM, encoding="utf-8")
     load_phantom(path)
-    words = [
-        "--force",
-        "5:N",
-        "--seconds",
-        "3",
-        "--presses",
-        "19",
-        "--stiffer-than",
-        "2:kN/m",
-        "--page",
-        str(tmp_path / "live.html"),
-        "--out",
-        str(tmp_path / "o"),
-    ]
+    words = ["--force", "5:N", "--seconds", "3", "--presses", "19", "--stiffer-than", "2:kN/m"]
+    words += ["--page", str(tmp_path / "live.html"), "--out", str(tmp_path / "o")]
     assert main(["press", "--arm", "ur5e", "--map", str(path), *words]) == 0
     capsys.readouterr()
     assert main(["map", "--table", str(tmp_path / "o" / "places.csv"), "--json"]) == 0
@@ -277,11 +256,8 @@ def test_a_column_of_lines_and_a_folder_of_presses_are_read(table, tmp_path, cap
     folders = [str(tmp_path / f"p{i}") for i in range(3)]
     assert main(["map", *folders, "--next", "0", "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
-    assert [(row["x"], row["y"], row["z"]) for row in answer["places"]] == [
-        (0.0, 0.0, 0.1),
-        (0.02, 0.0, 0.1),
-        (0.0, 0.02, 0.1),
-    ]
+    places = [(row["x"], row["y"], row["z"]) for row in answer["places"]]
+    assert places == [(0.0, 0.0, 0.1), (0.02, 0.0, 0.1), (0.0, 0.02, 0.1)]
 
 
 def test_folders_with_a_table_of_places_are_lines(table, tmp_path, capsys):
@@ -311,12 +287,3 @@ def test_presses_that_scatter_more_than_they_state_are_asked_for_repeats(table, 
     path.write_text("\n".join([rows[0], *vain, vain[7]]), encoding="utf-8")
     assert main(["map", "--table", str(path), "--next", "0"]) == 0
     assert "no place was pressed twice" not in capsys.readouterr().out
-
-
-def test_places_in_two_frames_are_refused():
-    parts = [
-        Presses(np.zeros((1, 3)), np.ones(1), np.ones(1), [f"{arm}.bag"], frames={arm: f"{arm}.bag"})
-        for arm in ("world", "base")
-    ]
-    with pytest.raises(InputError, match=r"base.bag has its place in the frame 'base', world.bag in 'world'"):
-        merge_presses(parts)

@@ -118,7 +118,7 @@ def test_a_curved_surface_is_mapped_in_its_own_places():
     height = 0.5 * np.sum((grid.places[grid.inside, :2] - 0.05) ** 2, axis=1) / 0.1
     assert grid.places[grid.inside, 2] == pytest.approx(
         height, abs=1e-3
-    )  # of a dome 25 mm high, pressed every 14 mm
+    )  # a dome of 25 mm, pressed every 14 mm
     low, high = result.predict(grid.places[grid.inside]).ci95.T
     known = truth(grid.places[grid.inside])
     assert np.mean((low < known) & (known < high)) > 0.85

@@ -135,7 +135,9 @@ def lines(tuning: Tuning, written: Sequence[object] = ()) -> Iterator[Text]:
     mark = Text("✓ proved stable", "green") if tuning.proved else Text("✕ nothing could be proved", "red")
     yield Text(printable(f"{title}   "), "bold").append(mark).append(printable(places))
     slowest = _slowest(tuning)
-    bound = "" if tuning.peak_bound is None else f" (proved below {quantity(tuning.peak_bound, 'N')})"
+    bound = (
+        "" if tuning.peak_bound is None else f" (proved below {quantity(tuning.peak_bound, 'N')} on springs)"
+    )
     touch = [
         f"at most {quantity(gains.approach, 'm')}/s",
         f"peak {quantity(tuning.peak, 'N')}{bound}",
@@ -194,7 +196,7 @@ def tuning_sentence(tuning: Tuning) -> str:
     bound, slowest = tuning.peak_bound, _slowest(tuning)
     proved = "Proved stable." if tuning.proved else "Nothing is proved."
     peak = f"The first touch peaks at {quantity(tuning.peak, 'N')}"
-    below = f", by proof below {quantity(bound, 'N')}" if bound is not None else ""
+    below = f", by proof below {quantity(bound, 'N')} on springs" if bound is not None else ""
     settles = f", and settles within {quantity(slowest, 's')}" if isfinite(slowest) else ""
     layers = f" F_max: {_force_max(tuning)}." if tuning.price is not None else ""
     return f"{proved} {peak}{below}{settles}.{layers}"

@@ -113,7 +113,8 @@ def slide_sentence(gains: Gains) -> str:
         f"at {1e3 * slide.speed:.3g} mm/s, on radii from {1e3 * slide.radius:.3g} mm, with friction up to "
     )
     floor = (
-        f"no normal, right or wrong, presses harder than {(1.0 + slide.mu_max**2) ** 0.5:.3g} times the force at rest; "
+        f"on springs no normal, right or wrong, presses harder than {(1.0 + slide.mu_max**2) ** 0.5:.3g} times the "
+        "force at rest: a surface that stiffens, or a sensor's bias, adds to that; "
         f"a step costs half the force at most up to {1e3 * edge_speed(gains, gains.cap):.2g} mm/s on "
         f"{gains.cap / 1e3:.4g} kN/m"
     )
