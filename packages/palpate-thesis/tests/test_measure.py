@@ -333,15 +333,6 @@ def test_a_claim_measured_in_parts_has_a_row_of_its_own():
     assert with_wholes([]) == []
 
 
-def test_a_run_cut_short_is_never_measured():
-    experiment = with_values(load("foam-hybrid"), {"run.press": 3000.0, "run.duration": 3600.0})
-    runs = Runs()
-    runs.record(with_values(experiment, {"run.press": 0.1}))  # compiles
-    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
-    with pytest.raises(KeyboardInterrupt):
-        runs.record(experiment)
-
-
 @pytest.mark.long
 def test_ctrl_c_stops_the_runs_of_all_threads():
     """Hours of simulated time are under way on other threads; they end within a look."""
