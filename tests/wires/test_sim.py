@@ -288,10 +288,7 @@ def test_an_untared_sensor_is_refused(folder, here, capsys):
     ("words", "says"),
     [
         ((), "--wire is missing"),
-        (
-            ("--wire", "x", "--gains", "G", *WORDS, "--surface", "K=5000"),
-            "--surface is for a simulated arm",
-        ),
+        (("--wire", "x", "--gains", "G", *WORDS, "--surface", "K=5000"), "--surface is for a simulated arm"),
         (("--wire", "sim:127.0.0.1:9"), "--gains, --force, --normal, --force-limit"),
         (("--wire", "x", "--gains", "G", *WORDS, "--normal", "0,0,0"), "must have a length"),
         (("--wire", "x", "--gains", "G", *WORDS, "--force-limit", "9:N"), "must lie between the force"),

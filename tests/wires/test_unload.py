@@ -220,10 +220,7 @@ def test_an_arm_that_its_own_watchdog_has_stopped_is_taken_over_again(folder):
 
 @pytest.mark.parametrize(
     ("limits", "says"),
-    [
-        ({"travel": 0.004}, "from the start"),
-        ({"seconds": 4.0, "hold": 3.0}, "the time limit of 4 s is over"),
-    ],
+    [({"travel": 0.004}, "from the start"), ({"seconds": 4.0, "hold": 3.0}, "the time limit of 4 s is over")],
 )
 def test_a_limit_of_travel_or_time_leaves_no_force(folder, limits, says):
     run = faulty(folder, lambda wire, sense: sense, **limits)

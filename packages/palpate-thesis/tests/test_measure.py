@@ -18,16 +18,7 @@ from palpate.bench import load, with_values
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.report.page import Table
-from palpate_thesis.claims import (
-    VERDICTS,
-    ThesisClaim,
-    claim,
-    spread,
-    tables,
-    texts,
-    verdict_of,
-    with_wholes,
-)
+from palpate_thesis.claims import VERDICTS, ThesisClaim, claim, spread, tables, texts, verdict_of, with_wholes
 from palpate_thesis.figure import studies, study
 from palpate_thesis.measure import STATE, MeasurementFormat, measure
 from palpate_thesis.runs import Runs
