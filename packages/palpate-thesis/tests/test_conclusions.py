@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from palpate_thesis.figures import fig_7_01
 from palpate_thesis.force_control import gain_sets
 from palpate_thesis.force_control.tracking import Tracking
-from palpate_thesis.neural_identifier.side_by_side import Identified
+from palpate_thesis.neural_identifier import side_by_side
+from palpate_thesis.neural_identifier.network import NetworkPress
+from palpate_thesis.neural_identifier.side_by_side import Identified, Pair, SharedPress
 from palpate_thesis.runs import Runs
 
 TRUTH = np.array([6000.0, 200.0, 0.1])
@@ -13,6 +16,20 @@ TRUTH = np.array([6000.0, 200.0, 0.1])
 
 def answer(K=6000.0, B=200.0, M=0.1, settled=0.1):
     return Identified(K, B, M, settled, settled, settled, 0.0, 6000.0, TRUTH)
+
+
+def test_an_answer_is_the_mean_of_the_last_half_second():
+    n = 4000
+    K = np.where(np.arange(n) < 250, 3000.0, 6000.0)
+    K[-500::2] += 60.0
+    curve = np.column_stack([K, np.full(n, 200.0), np.full(n, -1.0)])
+    press = NetworkPress("foam", np.zeros((n, 3)), np.zeros(n), 6030.0, np.zeros((n, 3)))
+    given = side_by_side.identified(SharedPress(press, curve, TRUTH), curve)
+    assert pytest.approx(6030.0) == given.K
+    assert given.over == pytest.approx(1.0)
+    assert given.ripple == pytest.approx(30.0 / 6030.0)
+    assert (given.settled_K, given.settled_B) == (pytest.approx(0.25), 0.0)
+    assert given.realistic == (True, True, False)
 
 
 @pytest.mark.parametrize(
@@ -27,6 +44,15 @@ def answer(K=6000.0, B=200.0, M=0.1, settled=0.1):
 )
 def test_each_coefficient_has_its_own_limit(changes, realistic):
     assert answer(**changes).realistic == realistic
+
+
+def test_a_method_that_is_faster_and_nearer_leaves_no_choice():
+    quick, slow = answer(settled=0.1, M=-2.0), answer(settled=0.5, B=150.0, M=0.3)
+    assert Pair(quick, slow).faster == (True, True, True)
+    assert Pair(quick, slow).nearer == (False, True)
+    assert not fig_7_01.dominates(Pair(quick, slow))
+    assert fig_7_01.dominates(Pair(answer(settled=0.1), slow))
+    assert fig_7_01.dominates(Pair(slow, answer(settled=0.1)))
 
 
 def test_gains_are_tuned_by_the_least_error_of_a_run_that_kept_contact():

@@ -9,7 +9,8 @@ from palpate.identifiers import RecursiveLeastSquares
 from palpate.instruments import analog_filter_190
 from palpate.records import Record
 from palpate_thesis.explanations import e1_why_negative_mass as bias
-from palpate_thesis.figures import fig_3_05, fig_3_07
+from palpate_thesis.figures import fig_3_05, fig_3_07, fig_4_02
+from palpate_thesis.figures import fig_6_01_04 as settling
 from palpate_thesis.figures import fig_6_02_05 as steady_state
 from palpate_thesis.least_squares import press_runs
 from palpate_thesis.runs import Runs
@@ -63,6 +64,14 @@ def as_window(s: dict[str, np.ndarray], **changes) -> bias.RegressionWindow:
     return bias.RegressionWindow(**{**values, **changes})
 
 
+def test_a_press_begins_at_the_change_over_and_ends_where_contact_is_lost():
+    phase = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 1.0])
+    columns = {name: np.arange(7.0) for name in press_runs.COLUMNS} | {"phase": phase}
+    record = Record(columns, dict.fromkeys(columns, "1"))
+    assert list(press_runs.contact(record)["t"]) == [0.0, 1.0, 2.0]
+    assert list(press_runs.contact(record)["x"]) == [2.0, 3.0, 4.0]
+
+
 def test_the_running_batch_solution_is_the_benchs_recursion(press):
     phi, force = press_runs.thesis_signals(press)
     theta = press_runs.trajectory(phi, force, (0.0, 0.0, 2e5), (1e10,) * 3)
@@ -89,6 +98,32 @@ def test_time_to_settle_of_an_exponential(constant, band):
     assert press_runs.settled_after(values, band=band) == pytest.approx(expected, abs=1.5 * TICK)
 
 
+def test_time_to_settle_counts_the_last_leaving():
+    values = np.ones(4000)
+    assert press_runs.settled_after(values) == 0.0
+    values[1500] = 2.0
+    assert press_runs.settled_after(values) == pytest.approx(1.501)
+    values[1500] = np.nan
+    assert press_runs.settled_after(values) == 0.0
+
+
+def test_a_mass_that_ends_near_zero_settles_on_the_scale_of_its_panel():
+    t = np.arange(4000) * TICK
+    mass = -30.0 * np.exp(-t / 0.02) - 0.5 - 0.1 * t
+    assert press_runs.settled_after(mass) > 3.0
+    assert press_runs.mass_settled_after(mass) == pytest.approx(0.051, abs=0.01)
+    mass[:9] = 1e4  # before the signals' lag the estimate is arbitrary
+    assert press_runs.mass_settled_after(mass) == pytest.approx(0.051, abs=0.01)
+
+
+def test_printed_values_stand_for_all_that_rounds_to_them():
+    least, most = steady_state.FOAM.apart
+    assert least < 7.2 / 6.8 - 1.0 < most
+    assert (round(6.8 * (1.0 + least + 1e-3), 1), round(6.8 * (1.0 + most - 1e-3), 1)) == (7.1, 7.3)
+    least, most = steady_state.RUBBER.apart
+    assert least < 0.0 < most
+
+
 def test_the_ratios_find_a_surface_without_noise_that_is_measured_from_its_face():
     light = steady_state.by_ratios(as_press(pushed(mass=0.0)))
     np.testing.assert_allclose(light["K"], K, rtol=1e-6)
@@ -97,6 +132,16 @@ def test_the_ratios_find_a_surface_without_noise_that_is_measured_from_its_face(
     heavy = steady_state.by_ratios(as_press(pushed()))
     assert heavy["B"][1] == pytest.approx(B, rel=0.05)
     assert heavy["M"][1] == pytest.approx(M, rel=0.05)
+
+
+def test_where_a_claim_fails_is_told(press):
+    del press
+    good, bad = (press_runs.PressEstimates(*[1.0] * 8, settled, 0.0, 0.0, 200.0) for settled in (1.0, 9.0))
+    answers = {"friction halved": [good, good, bad], "friction doubled": [bad, bad, good]}
+    assert press_runs.failing(answers, lambda f: f.settled_B < 2.0) == ["friction doubled"]
+    assert "friction doubled" in press_runs.where_it_fails(["friction doubled"], 2)
+    assert "none" in press_runs.where_it_fails(["a", "b"], 2)
+    assert "all 2" in press_runs.where_it_fails([], 2)
 
 
 def test_perfect_signals_find_the_surface_however_late_the_filters_are():
@@ -137,3 +182,18 @@ def test_where_the_sampling_puts_a_tone():
     assert at == {"480 Hz": 480.0, "480 Hz, filtered": 480.0, "960 Hz": 40.0, "960 Hz, filtered": 40.0}
     assert lines["960 Hz"].max() == pytest.approx(fig_3_05.AMPLITUDE, rel=1e-3)
     assert 0.0 < lines["960 Hz, filtered"].max() < 0.1 * fig_3_05.AMPLITUDE
+
+
+def test_a_clean_switch_keeps_contact_and_reaches_the_force():
+    good = fig_4_02.Switch(true_force=4.6, lost=False, last=20.3, most=22.0)
+    assert good.clean
+    for change in ({"true_force": 0.0}, {"lost": True}, {"last": 17.5}, {"most": 26.0}):
+        assert not good._replace(**change).clean
+
+
+def test_the_starts_reach_is_told_in_words():
+    some = settling.COVARIANCES >= 1e7
+    assert settling.reach_in_words(some) == "p from 1e+07 up"
+    assert settling.reach_in_words(some | True) == "every p"
+    assert settling.reach_in_words(~some & some) == "no p"
+    assert settling.reach_in_words(settling.COVARIANCES == 1e3) == "p = 1e+03"

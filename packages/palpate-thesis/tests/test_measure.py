@@ -20,7 +20,7 @@ from palpate.errors import InputError
 from palpate.report.page import Table
 from palpate_thesis.claims import VERDICTS, ThesisClaim, claim, spread, tables, texts, verdict_of, with_wholes
 from palpate_thesis.figure import studies, study
-from palpate_thesis.measure import STATE, MeasurementFormat, measure
+from palpate_thesis.measure import STATE, MeasurementFormat, chapter_of, measure
 from palpate_thesis.runs import Runs
 
 FIELDS = ["id", "source", "claim", "thesis", "measured", "tolerance", "verdict", "note", "of", "group"]
@@ -143,6 +143,15 @@ def test_there_is_one_count_of_claims(tmp_path, capsys):
     assert page.count('<article class="claim"') == len(claims)
     for row in claims:
         assert f'id="{row["id"]}"' in page
+
+
+@pytest.mark.parametrize(
+    ("number", "chapter"),
+    [("3.7", "The bench"), ("6.9", "Neural identifier"), ("6.10", "Force control"), ("7.1", "Conclusions"),
+     ("why-negative-mass", "Explanations")],
+)  # fmt: skip
+def test_figures_stand_in_their_chapters(number, chapter):
+    assert chapter_of(number) == chapter
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])

@@ -5,13 +5,24 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from palpate.bench import with_values
 from palpate.bench.force_input import COLUMNS
 from palpate.bench.summary import CONTACT, LOST
 from palpate.records import Record
 from palpate.studies.metrics.following import LIMIT
 from palpate.studies.metrics.window import SETTLE
-from palpate_thesis.explanations import e3_divergence
-from palpate_thesis.force_control.tracking import tracking
+from palpate_thesis.explanations import e2_integrator, e3_divergence
+from palpate_thesis.figures import fig_6_10, fig_6_11_17, fig_6_14, fig_6_15
+from palpate_thesis.force_control.tracking import (
+    FOAM,
+    RUBBER,
+    SINE,
+    Tracking,
+    following,
+    tracking,
+    variations,
+)
+from palpate_thesis.runs import move_wall, rougher, stops_holding
 
 TICK = 1e-3
 
@@ -61,6 +72,75 @@ def test_a_lost_contact_never_follows():
 def test_a_run_without_the_window_never_follows():
     assert not tracking(20.0, 30.0)(pressed(lambda t, d: d)).kept
     assert not tracking(0.0, 10.0)(pressed(lambda t, d: d, phase=np.zeros(10200))).follows
+
+
+def test_nine_of_ten_are_enough_and_eight_are_not():
+    good, bad = Tracking(0.1, 0.1, 0.0, 0.0, 0), Tracking(9.0, 9.0, 0.5, 0.0, 0)
+    assert following([good] * 9 + [bad])
+    assert not following([good] * 8 + [bad] * 2)
+    told = stops_holding({"a\nb": [good], "c": [bad, good]}, lambda one: one.follows)
+    assert told == "It holds with: a b; it does not with: c (1 of 2 runs)."
+
+
+def test_variations_change_what_they_say_and_nothing_else():
+    there = with_values(FOAM, move_wall(FOAM, 0.40))
+    assert there.wall.x == 0.40
+    assert there.wall.x - there.robot.start[0] == pytest.approx(FOAM.wall.x - FOAM.robot.start[0])
+    assert there.wall.x - there.approach.first == pytest.approx(FOAM.wall.x - FOAM.approach.first)
+    assert there.surface == FOAM.surface
+    rough = with_values(FOAM, rougher(FOAM, 2.0))
+    assert rough.friction.coulomb == tuple(2.0 * f for f in FOAM.friction.coulomb)
+    names = [set(variations(e, 0)) for e in (FOAM, RUBBER, with_values(RUBBER, SINE))]
+    assert "relaxing\nfoam" in names[0]
+    assert "relaxing\nfoam" not in names[1]
+    assert names[2] - names[1] == {"clock\nruns on", "motor 2\nto 4 N m"}
+
+
+def test_ends_of_intervals_are_told_apart_by_level():
+    ends = fig_6_10.interval_ends(pressed(lambda t, d: np.where(d == 20.0, 16.0, 12.5)))
+    assert (ends.high, ends.low) == pytest.approx((-4.0, 2.5))
+    assert fig_6_10.misses(ends)
+    assert not fig_6_10.misses(fig_6_10.Ends(-4.0, 0.5))
+
+
+def test_the_course_of_the_error_ends_with_the_contact():
+    record = pressed(lambda t, d: d - 2.0, seconds=20.0)
+    whole = fig_6_14.cycle_errors(record)
+    assert whole.error == pytest.approx([2.0] * 4)
+    assert whole.lost is None
+    record.columns["phase"][12200:12300] = LOST
+    cut = fig_6_14.cycle_errors(record)
+    assert len(cut.error) == 2
+    assert cut.lost == pytest.approx(12.0, abs=2e-3)
+
+
+def test_an_error_that_changes_sign_is_still_an_error():
+    record = pressed(lambda t, d: d, seconds=15.0)
+    t = record["t"] - 0.2
+    record.columns["y"][:] = np.where(np.floor(t / 2.5) % 2 == 0, 2e-3, -2e-3)
+    assert fig_6_15.measure_free_errors(record).y == pytest.approx(2e-3)
+
+
+@pytest.mark.parametrize("restart", [0.0, 5.0])
+@pytest.mark.parametrize("adapts", [1.0, 4.0])
+def test_the_time_of_adapting_is_found_whether_the_clock_restarts_or_not(adapts, restart):
+    def force(t, d):
+        sine = 3.0 * np.sin(np.pi * (np.mod(t, restart) if restart else t))
+        return d + sine - np.where(t < adapts, 5.0, 0.0)
+
+    record = pressed(force, seconds=20.0)
+    assert fig_6_11_17.adapted_at(fig_6_11_17.away_from_settled(record)) == pytest.approx(
+        adapts, abs=fig_6_11_17.SMOOTHED
+    )
+
+
+def test_the_gain_of_an_integrator_is_found_under_noise():
+    noise = np.random.default_rng(3).normal(0.0, 0.5, 10200)
+    record = pressed(lambda t, d: d - 3.0 * np.exp(-np.mod(t, 2.5)) + noise)
+    pressing = record["phase"] == CONTACT
+    error = (record["force_desired"] - record["force_measured"]) * pressing
+    record.columns["memory_fx"][1:] = 7.0 * TICK * np.cumsum(error)[:-1]
+    assert e2_integrator.fit_integral_gain(record) == pytest.approx(7.0, rel=1e-9)
 
 
 def test_torque_gains_are_the_slope_of_the_network():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from palpate_thesis.explanations import e4_probe
+from palpate_thesis.figures import fig_6_06
 from palpate_thesis.neural_identifier import claims, network
 from palpate_thesis.neural_identifier.network import NetworkAnswer, NetworkChoice, NetworkPress
 
@@ -71,6 +72,13 @@ def test_a_probe_beyond_what_was_pressed_is_warned_of():
     assert {code for code, _ in probe.probe(displacement=4e-3).warnings} == {"probe-outside-learned"}
 
 
+def test_a_cut_press_has_the_ratio_of_its_own_end():
+    press = spring(offset=5.0)
+    short = network.cut(press, 1.0)
+    assert len(short.force) == len(short.squares) == 1000
+    assert short.ratio == pytest.approx(23.0 / 3e-3)
+
+
 def test_every_part_holds_of_an_answer_as_the_thesis_has_it():
     found = claims.claims(grounds([GOOD] * 100), claims.FOAM)
     assert [c.id for c in found] == [
@@ -95,3 +103,43 @@ def test_a_part_differs_alone_when_its_own_number_does(suffix, change):
     bad = GOOD._replace(**change)
     found = claims.claims(grounds([bad] * 100), claims.FOAM)
     assert [c.id for c in found if c.verdict != "reproduced"] == [f"network-foam.{suffix}"]
+
+
+def test_nine_of_ten_runs_are_enough_and_fewer_are_not():
+    bad = GOOD._replace(M=-1.0)
+    assert claims.enough([GOOD] * 90 + [bad] * 10, claims.MASS)
+    assert not claims.enough([GOOD] * 89 + [bad] * 11, claims.MASS)
+
+
+def test_a_note_names_the_part_of_the_sweep_that_agrees():
+    bad = GOOD._replace(M=-1.0)
+    swept = {NetworkChoice(): [bad] * 10, NetworkChoice(60.0, 0.1, thresholds=False): [GOOD] * 10}
+    told = claims.where(grounds([bad] * 100, swept), claims.MASS)
+    assert "fixed at zero: 60 N with weights to 0.1" in told
+    assert "learn: none" in told
+
+
+def test_variance_is_shared_out_between_starts_and_noise():
+    start, seed = np.meshgrid(np.arange(5.0), np.arange(4.0))
+    assert claims.share_of_starts(start.ravel(), 5) == pytest.approx(1.0)
+    assert claims.share_of_starts(seed.ravel(), 5) == pytest.approx(0.0)
+
+
+def test_a_rate_is_slower_only_if_every_smaller_one_takes_longer():
+    times = dict(zip(fig_6_06.SMALLER, (0.1, 0.2, 0.6, 2.0), strict=True))
+    by_rate = {rate: [GOOD._replace(error_gone=t)] for rate, t in times.items()}
+    assert fig_6_06.slower_throughout(by_rate) == [True]
+    by_rate[fig_6_06.SMALLER[2]] = [GOOD._replace(error_gone=0.15)]
+    assert fig_6_06.slower_throughout(by_rate) == [False]
+
+
+def test_a_rate_is_too_large_when_all_beyond_it_are_stuck_too():
+    stuck = [GOOD._replace(error_gone=np.inf)]
+    by_rate = {rate: stuck if rate in (1e-3, 3e-2, 1e-1) else [GOOD] for rate in fig_6_06.RATES}
+    assert fig_6_06.stuck_from(by_rate) == 3e-2
+    assert fig_6_06.stuck_from({rate: [GOOD] for rate in fig_6_06.RATES}) == np.inf
+
+
+def test_a_sign_is_firm_when_no_noise_seed_turns_it():
+    values = np.array([[1.0, -1.0, 1.0], [0.5, -2.0, -1.0]])
+    assert e4_probe.firm_signs(values).tolist() == [True, True, False]
