@@ -13,12 +13,7 @@ from palpate._jit import BoundKernel, kernel
 from palpate._jit.typed_edge import cast_array, cast_number
 from palpate.errors import InputError
 from palpate.force import ForceLoop, SlidingLoop
-from palpate.identifiers import (
-    ContactIdentifier,
-    NeuralProbe,
-    RecursiveLeastSquares,
-    RestartingLeastSquares,
-)
+from palpate.identifiers import ContactIdentifier, NeuralProbe, RecursiveLeastSquares, RestartingLeastSquares
 from palpate.identifiers.neural_probe import SETTINGS
 from palpate.networks.perceptron import Perceptron
 

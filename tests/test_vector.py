@@ -8,21 +8,7 @@ import pytest
 
 from palpate import _vector
 from palpate._jit import kernel, law
-from palpate._vector import (
-    Mat3,
-    Vec3,
-    atan2,
-    clip,
-    cos,
-    exp,
-    outer,
-    resolve,
-    sign,
-    sin,
-    solve,
-    sqrt,
-    trace,
-)
+from palpate._vector import Mat3, Vec3, atan2, clip, cos, exp, outer, resolve, sign, sin, solve, sqrt, trace
 
 RNG = np.random.default_rng(11)
 a_, b_ = RNG.uniform(-2.0, 2.0, (2, 3))

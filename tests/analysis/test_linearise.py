@@ -41,10 +41,7 @@ def swing(f):
 
 @pytest.mark.parametrize(
     ("damping", "kf", "ki", "low", "high"),
-    [
-        (60.0, 1.0, 0.003, 1e4, 2e4),
-        pytest.param(480.0, 0.25, 0.0015, 3e5, 6e5, marks=pytest.mark.long),
-    ],
+    [(60.0, 1.0, 0.003, 1e4, 2e4), pytest.param(480.0, 0.25, 0.0015, 3e5, 6e5, marks=pytest.mark.long)],
 )
 def test_the_simulated_bench_swings_as_predicted_on_both_sides_of_the_boundary(damping, kf, ki, low, high):
     """All that is nonlinear in it included: geometry, one-sided contact, stick and slip along the surface."""

@@ -62,10 +62,6 @@ def test_a_change_keeps_the_force_and_the_surface_is_another_one():
 
 WRONG = {
     "an arm that there is none of": ('"ur5e"', '"ur5"', "unknown arm 'ur5'"),
-    "no surface": ("stiffness = 5e3", "", r"the key 'stiffness' is missing in \[surface\]"),
-    "a surface of nothing": ("5e3", "0.0", r"stiffness in \[surface\] must be a number above 0, got 0"),
-    "a key": ("stiffness", "stiffnes", "did you mean 'stiffness'"),
-    "infinite": ("5e3", "inf", r"stiffness in \[surface\] must be finite"),
     "a force below the noise": ("[surface]", "noise = 3.0\n[surface]", "below 8 standard deviations"),
     "a force beyond the sensor": ("[surface]", "force.first = 200.0\n[surface]", "full scale"),
 }

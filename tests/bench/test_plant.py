@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from palpate._jit import kernel
-from palpate._vector import ZERO3, Vec3, solve
+from palpate._vector import Vec3, solve
 from palpate.bench.plant import Plant
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, StickSlip, join
 from palpate.environments.surface import SurfaceState, alone
@@ -185,16 +185,6 @@ def test_what_the_motors_give_is_found_again():
     assert abs(fine) < 0.4 * abs(coarse), "first order: a quarter"
 
 
-def test_friction_takes_what_its_bristles_do_not_hold():
-    """Over a long slide the friction's work is the Coulomb torque times the way, and never less than stored."""
-    plant = plant_with()
-    state = at_rest(plant, 0.40)
-    end, out = after(plant, state, push(plant, (40.0, 0.0, 0.0), state.q), 50e-6, 0.2)
-    stored = sum(plant.friction.stored_energy(end.bristles))
-    assert out[:, 1].sum() > stored
-    assert np.all(np.cumsum(out[:, 1]) > -1e-12)
-
-
 def test_below_break_away_the_arm_creeps_and_stops():
     """Less torque than stiction: the joints move about as far as their bristles bend, and no further."""
     plant = plant_with()
@@ -207,17 +197,6 @@ def test_below_break_away_the_arm_creeps_and_stops():
     assert np.all(moved >= 0.99 * bristles)
     assert np.all(moved < 2.0 * bristles)
     assert np.abs(crept).max() < 1e-3 * bristles.max()
-
-
-def test_pressed_to_rest_the_surface_bears_the_whole_push():
-    """Statics: without friction, J^T f balances the torque and K x the force."""
-    none = LuGre(ZERO3, ZERO3, Vec3(30.0, 3.0, 0.5))
-    plant = plant_with(friction=none)
-    state = pressed(plant)
-    end, out = after(plant, state, push(plant, (15.0, 0.0, 0.0), state.q), 50e-6, 0.6)
-    p = plant.arm.pose(end.q).x - WALL
-    assert out[-1, 5] == pytest.approx(FOAM.stiffness * p, rel=0.02)
-    assert out[-1, 5] == pytest.approx(15.0, rel=0.05)  # the arm creeps on, and J with it
 
 
 wrenches = st.tuples(st.floats(-60, 60), st.floats(-20, 20), st.floats(-1, 1))

@@ -57,8 +57,7 @@ def test_compiled_and_stepped_runs_agree_to_the_bit(name):
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=pytest.mark.long if n.endswith(OF_ITS_OWN) else ()) for n in names()],
+    "name", [pytest.param(n, marks=pytest.mark.long if n.endswith(OF_ITS_OWN) else ()) for n in names()]
 )
 def test_the_same_seed_gives_the_same_numbers_and_another_others(name):
     bench = build(quick(name))

@@ -169,10 +169,7 @@ BAD = {
         lambda rig: rig.run(np.zeros(10), 1.0),
         "duration belongs to a path that is a function",
     ),
-    "shape": (
-        lambda rig: rig.run(np.zeros((10, 3))),
-        r"path must be of shape \(n,\).*got \(10, 3\)",
-    ),
+    "shape": (lambda rig: rig.run(np.zeros((10, 3))), r"path must be of shape \(n,\).*got \(10, 3\)"),
     "three ticks": (lambda rig: rig.run(np.zeros(3)), r"n at least 4; got \(3,\)"),
     "not finite": (lambda rig: rig.run([0.0, 1.0, np.nan, 2.0, 3.0]), "path must be finite numbers"),
     "one number": (lambda rig: rig.run(lambda _: 1.0, 1.0), "one position for each time"),

@@ -141,13 +141,7 @@ def test_a_wrong_entry_is_one_line(tmp_path, capsys, text, words):
 
 @pytest.mark.parametrize(
     "words",
-    [
-        ["--stiffness", "5:1"],
-        ["--stiffness", "0"],
-        ["--repeats", "0"],
-        ["--force", "1e9"],
-        ["nothing.toml"],
-    ],
+    [["--stiffness", "5:1"], ["--stiffness", "0"], ["--repeats", "0"], ["--force", "1e9"], ["nothing.toml"]],
 )
 def test_wrong_options_end_with_exit_code_2(capsys, words):
     assert main(["benchmark", "force", *words]) == 2

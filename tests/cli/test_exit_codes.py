@@ -30,7 +30,7 @@ def _parameter(log):
 LOGS = [_parameter(log) for log in (*logs_of_the_project(), *measured_logs())]
 
 
-OTHER_SIZES = [("0", "24"), ("²", "²"), ("-5", "24"), ("80", "0")]
+OTHER_SIZES = [("0", "24"), ("²", "²"), ("-5", "0")]
 """Columns and lines of a terminal, beside the smallest."""
 
 
@@ -51,7 +51,11 @@ def wanted_code(answer):
 
 
 def check(capfd, log, *words):
-    """Run the command with and without --json, and hold code, verdicts, text and picture against each other."""
+    """Run the command with and without --json, and hold code, verdicts, text and picture against each other.
+
+    Returns:
+        The code, and the object that was printed; none where the log is refused.
+    """
     code, text, said = identify(capfd, log, *words, "--figure", "picture.png")
     code_of_json, out, error = identify(capfd, log, *words, "--json")
     assert code == code_of_json
@@ -59,12 +63,13 @@ def check(capfd, log, *words):
         assert text == out == ""
         assert said == error
         assert said.count("\n") == 1
-        return code
+        return code, None
     assert said == error == ""
-    assert code == wanted_code(json.loads(out))
+    answer = json.loads(out)
+    assert code == wanted_code(answer)
     assert ("✓ identified" in text) == (code == 0)
     assert ("figure: picture.png" in text) == Path("picture.png").exists()
-    return code
+    return code, answer
 
 
 @pytest.mark.parametrize("log", LOGS)
@@ -72,22 +77,23 @@ def test_exit_code_of_every_log_follows_its_verdicts(log: TypedLog, capfd, elsew
     check(capfd, log.path, *log.words.split())
 
 
+CODES = {"only_unloading": 0, "one_touch": 1, "fluid": 1, "free_motion": 1, "fracture": 1, "no_number": 2}
+
+
 @pytest.mark.parametrize("words", [pytest.param((), marks=pytest.mark.long), NAMED], ids=["bare", "named"])
 @pytest.mark.parametrize("make", hostile_logs.HOSTILE, ids=lambda make: make.__name__)
 def test_hostile_logs_end_as_an_answer_or_one_line(make, words, capfd, elsewhere):
-    check(capfd, hostile_logs.write_log(elsewhere, make()), *words)
+    code, _ = check(capfd, hostile_logs.write_log(elsewhere, make()), *words)
+    assert not words or code == CODES.get(make.__name__, code)
 
 
 @pytest.mark.parametrize(
-    ("name", "code"),
-    [("only_unloading", 0), ("one_touch", 1), ("fluid", 1), ("free_motion", 1), ("fracture", 1), ("no_number", 2)],
-)  # fmt: skip
-def test_exit_codes_of_hostile_logs(name, code, capfd, elsewhere):
-    log = hostile_logs.write_log(elsewhere, getattr(hostile_logs, name)())
-    assert identify(capfd, log, *NAMED)[0] == code
-
-
-@pytest.mark.parametrize("make", [hostile_logs.only_unloading, hostile_logs.only_unloading_in_contact])
+    "make",
+    [
+        hostile_logs.only_unloading,
+        pytest.param(hostile_logs.only_unloading_in_contact, marks=pytest.mark.long),
+    ],
+)
 def test_an_unloading_is_drawn_where_there_is_no_loading(make, capfd, elsewhere):
     log = hostile_logs.write_log(elsewhere, make())
     code, text, said = identify(capfd, log, *NAMED, "--figure", "log.png", "--report", "page.html")
@@ -110,13 +116,12 @@ def fail(*_, **__):
     [(), pytest.param(("--json",), marks=pytest.mark.long)],
     ids=["text", "json"],
 )
-@pytest.mark.parametrize(("name", "code"), [("only_unloading", 0), ("fluid", 1)])
-def test_a_picture_that_fails_is_one_line_after_the_answer(name, code, words, capfd, elsewhere, monkeypatch):
-    log = hostile_logs.write_log(elsewhere, getattr(hostile_logs, name)())
+def test_a_picture_that_fails_is_one_line_after_the_answer(words, capfd, elsewhere, monkeypatch):
+    log = hostile_logs.write_log(elsewhere, hostile_logs.only_unloading())
     answer = identify(capfd, log, *NAMED, *words)[1]
     monkeypatch.setattr(charts, "_window", fail)
     ended, text, said = identify(capfd, log, *NAMED, *words, "--figure", "log.png")
-    assert ended == code
+    assert ended == 0
     assert text.replace(" --figure log.png", "") == answer
     assert said.count("\n") == 1
     assert said.startswith("palpate: log.png is not drawn: ValueError in charts.py, line ")
@@ -146,7 +151,6 @@ def test_a_folder_is_identified_if_one_of_its_logs_is(names, code, capfd, elsewh
         hostile_logs.write_log(elsewhere / "logs", getattr(hostile_logs, name)(), f"{name}.csv")
     ended, _, said = identify(capfd, "logs", *NAMED)
     assert (ended, said) == (code, "")
-    assert identify(capfd, "logs", *NAMED, "--json")[0] == code
 
 
 def test_a_unit_that_is_guessed_from_values_is_no_identification(capfd, elsewhere):
@@ -160,8 +164,6 @@ def test_a_unit_that_is_guessed_from_values_is_no_identification(capfd, elsewher
     assert code == 1
     assert text.startswith("! no unit was given for 't': ms is taken from its values")
     assert "✓ identified" not in text
-    code, out, _ = identify(capfd, log, "--time", "t", *columns, "--json")
-    assert (code, wanted_code(json.loads(out))) == (1, 1)
     code, out, _ = identify(capfd, log, "--time", "t:ms", *columns, "--json")
     assert code == 0
     assert {w["code"] for w in json.loads(out)["warnings"]} & {"unit-guess", "unit-stated"} == {"unit-stated"}
@@ -174,8 +176,8 @@ def test_a_soft_surface_is_in_doubt_unless_its_units_are_stated(unit, code, capf
     rows[:, 2] *= 1e-6 if code else 1.0
     log = hostile_logs.write_log(elsewhere, rows, head="t,a,b")
     words = ("--time", "t:s", "--position", "a:mm", "--force", f"b{unit}")
-    assert check(capfd, log, *words) == code
-    answer = json.loads(identify(capfd, log, *words, "--json")[1])
+    ended, answer = check(capfd, log, *words)
+    assert ended == code
     verdicts = {p["verdict"] for p in (*answer["parameters"].values(), answer["working_point"]["stiffness"])}
     assert ("identified" in verdicts) == (code == 0)
     found = palpate.identify(log, time="t:s", position="a:mm", force=f"b{unit}")

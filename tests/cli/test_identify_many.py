@@ -54,18 +54,14 @@ def test_a_folder_is_its_logs_and_what_they_say_together(presses, capsys):
     point = found["pooled"]["working_point"]
     assert point["stiffness"]["value"] == pytest.approx(5000, rel=0.1)
     assert point["force_N"][0] < point["force_N"][1]
+    _, alone = ask(capsys, presses / "press_2.csv", "--lag", "0")
+    assert found["logs"][0] == {key: alone[key] for key in alone if key not in ("command", "files")}
 
 
 def test_a_covariate_is_the_mean_of_a_logs_own_readings(tmp_path):
     log = tmp_path / "log.csv"
     log.write_text("time_s;warm\n0;20,5\n1;-1\n2;21,5\n")
     assert read_covariates([log], ["warm"], missing=["-1"], delimiter=";")["warm"] == pytest.approx([21.0])
-
-
-def test_one_log_of_many_is_what_it_is_alone(presses, capsys):
-    _, many = ask(capsys, presses)
-    _, alone = ask(capsys, presses / "press_2.csv")
-    assert many["logs"][0] == {key: alone[key] for key in alone if key not in ("command", "files")}
 
 
 def test_a_log_that_fails_is_a_row_that_says_why(presses, capsys):

@@ -50,7 +50,18 @@ CASES = {
     "references": ["references check"],
     "speed": ["speed"],
 }
-LONG = {"certify", "checks", "press", "references", "run", "slide", "speed", "study", "tune"}
+LONG = {
+    "certify",
+    "certify, another controller",
+    "checks",
+    "press",
+    "references",
+    "run",
+    "slide",
+    "speed",
+    "study",
+    "tune",
+}
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 
 import palpate
 from palpate.cli import _terminal, main
-from palpate.report import style
 from palpate.report.page import Table
 from palpate.report.terminal import head, show_table
 from palpate.text import printable
@@ -60,16 +59,6 @@ def test_json_is_ascii_and_none_is_null(capsys):
     assert line.isascii()
     assert line.count("\n") == 1
     assert json.loads(line) == {"name": "Kraft ± \x1b[2J", "value": None}
-
-
-def test_a_name_that_is_a_formula_is_drawn_as_a_name(tmp_path):
-    drawing, (axis,) = style.figure()
-    drawing.text(0.1, 0.9, style.literal("cost $5 to $x^{$.csv"))
-    axis.set_title("$bad{$", loc="left")
-    axis.set_xlabel("$K_e$ [N/m]")
-    axis.plot([0.0, 1.0], [0.0, 1.0], label=r"$\nothing{$")
-    axis.legend()
-    assert style.save(drawing, tmp_path / "a.png").stat().st_size > 5000
 
 
 def test_a_log_with_a_hostile_name(capsys):

@@ -16,12 +16,6 @@ each = pytest.mark.parametrize(
 
 
 @each
-def test_it_is_known_by_its_word_and_says_what_it_is(table):
-    assert table.__struct_config__.tag
-    assert type(table).__doc__
-
-
-@each
 @pytest.mark.parametrize("law", laws.IN_PLAIN, ids=lambda law: law.__name__)
 def test_it_obeys_the_laws_that_users_run_on_theirs(table, law):
     law(table.build(TICK, WALL))

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from palpate._jit import kernel
 from palpate._vector import Mat3, Vec3
 from palpate.controllers import (
     DecoupledHybrid,
@@ -64,31 +63,12 @@ def walk(controller, sense, task, model, torques):
         torques[k, 0], torques[k, 1], torques[k, 2] = torque.x, torque.y, torque.z
 
 
-compiled_walk = kernel(walk)
-
-
 def walk_on_arrays(controller, sense, task, model, ticks=5):
     state, torques = controller.start(), []
     for _ in range(ticks):
         torque, state = controller.step(state, sense, task, model)
         torques.append(torque)
     return np.array(torques)
-
-
-ONES_OF_A_KIND = ("hybrid", "proportional-integral")
-
-
-@pytest.mark.parametrize(
-    "make",
-    [pytest.param(m, id=n, marks=() if n in ONES_OF_A_KIND else pytest.mark.long) for n, m in MAKERS.items()],
-)
-def test_plain_and_compiled_are_the_same_to_the_last_bit(make):
-    controller = make(alike, alike)
-    values = [by_value(v) for v in inputs(3, 3, 1)]
-    plain, compiled = np.empty((5, 3)), np.empty((5, 3))
-    walk(controller, *values, plain)
-    compiled_walk(controller, *values, compiled)
-    assert np.array_equal(plain, compiled)
 
 
 @each

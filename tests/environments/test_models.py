@@ -143,7 +143,3 @@ def test_a_massless_sphere_comes_back_at_constant_speed():
 def test_bad_parameters_are_refused_with_their_limit(make, words):
     with pytest.raises(InputError, match=words):
         make()
-
-
-def test_integers_become_floats():
-    assert all(type(value) is float for value in KelvinVoigt(1, 2, 3))

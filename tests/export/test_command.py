@@ -127,13 +127,7 @@ def test_a_damping_that_is_given_is_said_to_be_given(capsys, elsewhere):
         (("--to", "drake", "--model", "scene.xml", "--geom", "foam"), "begins with <mujoco>"),
         ((*TO_DRAKE, "--probe", "foam"), "is the surface itself"),
         (("--to", "mjcf-spring", "--model", "scene.xml"), "takes none"),
-        (
-            (
-                "--to",
-                "mjcf-spring",
-            ),
-            "give a small one with --mass",
-        ),
+        (("--to", "mjcf-spring"), "give a small one with --mass"),
         (("--to", "gazebo"), "gazebo"),
         ((*TO_MUJOCO, "--damping", "-1"), "--damping must be 0 or more"),
         ((*TO_MUJOCO, "--damping", "nan"), "--damping needs a number"),

@@ -114,15 +114,6 @@ def test_a_lost_contact_is_approached_anew(loop):
     assert max(speeds[-50:]) <= loop.gains.approach
 
 
-def test_it_never_asks_for_more_than_the_limit(loop):
-    rng = np.random.default_rng(0)
-    for _ in range(3000):
-        speed = loop.update(float(30.0 * rng.normal()), float(0.1 * rng.normal()))
-        assert abs(speed) <= loop.gains.arm.limits.speed
-        assert math.isfinite(speed)
-    assert all(map(math.isfinite, loop.state))
-
-
 def test_a_motor_at_its_limit_is_told_and_the_command_does_not_wind_up(loop):
     rng, x, x_c, K, most = np.random.default_rng(4), -2e-4, -2e-4, 2e4, 13.0
     blocked = 0

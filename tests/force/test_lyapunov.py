@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_lyapunov
 
-from palpate.force import lyapunov
 from palpate.force.lyapunov import common, single, weight_of
 
 N = 5
@@ -41,27 +40,3 @@ def test_the_weight_of_a_norm_has_that_norm_for_an_answer(stable):
 def test_what_is_not_stable_has_no_norm(stable):
     assert single(3.0 * stable[0]) is None
     assert common([stable[0], 3.0 * stable[1]], stable[0]) is None
-
-
-@pytest.mark.parametrize("apart", [0, 1])
-def test_the_steps_are_newtons(stable, apart):
-    """Gradient and Hessian of the barrier against central differences, whose error is some 1e-7 of their size."""
-    basis = lyapunov._Symmetric.of(N, apart)
-    rng = np.random.default_rng(4)
-    W, s, k = np.diag(np.linspace(1.0, 2.0, N)), 0.7, len(basis.rows)
-    P = 0.5 * np.eye(N) + basis.matrix(0.02 * rng.standard_normal(k))
-
-    def barrier(numbers):
-        Q, t = P + basis.matrix(numbers[:-1]), s + numbers[-1]
-        whole = [Q, np.eye(N) - Q, *(Q - Phi.T @ Q @ Phi + t * W for Phi in stable)]
-        return -sum(np.linalg.slogdet(F)[1] for F in whole)
-
-    def gradient(numbers):
-        return lyapunov._barrier(P + basis.matrix(numbers[:-1]), s + numbers[-1], stable, W, basis)[0]
-
-    own, hessian = lyapunov._barrier(P, s, stable, W, basis)
-    steps = 1e-5 * np.eye(k + 1)
-    first = [(barrier(h) - barrier(-h)) / 2e-5 for h in steps]
-    second = [(gradient(h) - gradient(-h)) / 2e-5 for h in steps]
-    np.testing.assert_allclose(own, first, rtol=1e-6, atol=1e-6 * np.abs(own).max())
-    np.testing.assert_allclose(hessian, second, rtol=1e-6, atol=1e-6 * np.abs(hessian).max())

@@ -15,7 +15,7 @@ from foreign.truth import Dense, dynamic_stiffness, octave_stiffness, press_stif
 
 physics = pytest.mark.long
 """Of the judge's own physics, which takes seconds to compile: nothing of the package."""
-SLICE = [cell for i, cell in enumerate(CELLS) if i % 23 == 5]
+SLICE = [cell for i, cell in enumerate(CELLS) if i % 69 == 5]
 
 
 def pressed(surface, depth, dt, seconds=2.0, below=0.6):
@@ -115,16 +115,6 @@ def test_what_relaxes_at_rest_is_no_part_of_the_slope_of_a_press():
     press = Dense(1e-3, depth, force, np.ones(800, bool))
     told = press_stiffness(Surface("relaxing", {"K": 1e3}), press, 1.0)
     assert told == pytest.approx((1e3, 1e3), rel=1e-6)
-
-
-@physics
-def test_a_surface_that_recovers_slowly_is_met_deeper_again():
-    slow = Surface("slow", {"K": 1000.0, "B": 500.0})
-    x, _, _, touched = pressed(slow, 5e-3, 1e-4)
-    left = np.flatnonzero(touched.contact[:-1] & ~touched.contact[1:])[0]
-    assert touched.depth[left + 1000] > x[left + 1000] + 1e-4
-    decay = touched.depth[left + 1000] / touched.depth[left + 1]
-    assert decay == pytest.approx(np.exp(-1000 * 999 / 500 * 1e-4 / 1), rel=2e-2)
 
 
 @physics

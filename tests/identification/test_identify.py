@@ -55,14 +55,14 @@ def holds(parameter, truth):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("pole", [0.0, 0.9, 0.99])
-def test_intervals_cover_the_truth_under_coloured_noise(pole):
+def test_intervals_cover_the_truth_under_coloured_noise():
+    """Of noise as coloured as a filtered sensor's; of many kinds and surfaces: docs/trust.md."""
     truth = {"K": 5000.0, "B": 40.0, "M": 0.5}
     inside = dict.fromkeys(truth, 0)
     runs = 25
     for seed in range(1000, 1000 + runs):
         found = identify(
-            shaken(seed=seed, pole=pole, n=1500), model="kelvin-voigt-mass", lag=0.0, tolerance=1.0
+            shaken(seed=seed, pole=0.95, n=1500), model="kelvin-voigt-mass", lag=0.0, tolerance=1.0
         )
         for name, value in truth.items():
             inside[name] += holds(found.parameters[name], value)

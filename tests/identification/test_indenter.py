@@ -94,11 +94,7 @@ def test_a_deep_press_of_a_sphere_is_beyond_hertz():
         None,
         Press((), np.empty((2, 0)), np.empty((2, 0))),
         Press((GENTLE,), np.ones((2, 3)), np.empty((2, 0))),
-        Press(
-            (GENTLE, FALLING),
-            np.ones((2, 3)),
-            np.empty((2, 0)),
-        ),
+        Press((GENTLE, FALLING), np.ones((2, 3)), np.empty((2, 0))),
     ],
 )
 def test_a_press_that_shows_no_slope_gives_no_modulus(press):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from palpate.errors import InputError
 from palpate.identification.pooling import pool, random_effects
 from palpate.identification.result import Identification, WorkingPoint
-from palpate.identification.uncertainty import Parameter, Verdict, student
+from palpate.identification.uncertainty import Parameter, Verdict
 
 
 def parameter(value, half, unit="N/m", verdict=Verdict.IDENTIFIED):
@@ -161,13 +161,6 @@ def test_of_equal_errors_a_covariate_is_ordinary_least_squares():
     assert own.value == pytest.approx(at_mean)
     assert own.between**2 == pytest.approx(rest @ rest / 6 - 0.5, rel=1e-6)
     assert std == pytest.approx(np.sqrt(rest @ rest / 6 / 8) / temperature.std(), rel=1e-6)
-
-
-def test_the_interval_of_a_slope_holds_the_truth():
-    """2000 sets of eight: 95 %, to 0.5 % (1 sigma); the deviations do not depend on the slope."""
-    found = [random_effects(*meta_regression(seed, -2.0)) for seed in range(2000)]
-    holds = [abs(own.slopes[0][0] + 2.0) <= student(own.freedom) * own.slopes[0][1] for own in found]
-    assert np.mean(holds) == pytest.approx(0.95, abs=0.015)
 
 
 def test_a_covariate_explains_what_differs_between_logs():

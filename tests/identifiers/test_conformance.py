@@ -132,27 +132,6 @@ def test_units_of_the_parameters_do_not_matter(make):
     np.testing.assert_allclose(theirs.estimate().std * unit, ours.estimate().std, rtol=1e-6)
 
 
-@pytest.mark.long
-@linear
-@pytest.mark.parametrize(("pole", "least"), [(0.0, 0.90), (0.8, 0.88)], ids=["white", "coloured"])
-def test_the_stated_interval_covers_the_truth_at_its_rate(make, pole, least):
-    """300 runs know a rate of 95 % to 1.3 %; a second has few blocks to know the colour of its noise by."""
-    from scipy.signal import lfilter
-
-    inside = []
-    for seed in range(300):
-        phi, _ = press(1000, seed)
-        white = np.random.default_rng(1000 + seed).normal(0.0, NOISE, 1100)
-        noise = lfilter([np.sqrt(1.0 - pole**2)], [1.0, -pole], white)[100:]
-        estimator = make()
-        estimator.update_many(phi, phi @ TRUTH + noise)
-        estimate = estimator.estimate()
-        inside.append(np.abs(estimate.theta - TRUTH) < 1.96 * estimate.std)
-    covered = np.mean(inside, axis=0)
-    assert np.all(covered > least), covered
-    assert np.all(covered < 0.995), covered
-
-
 @linear
 def test_what_is_given_back_is_a_copy(make):
     estimator = make()

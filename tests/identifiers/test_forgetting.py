@@ -21,10 +21,7 @@ def subspace(information, phi, variances):
     return (R - (1.0 - KEEP) * parallel) / scale[:, None] / scale
 
 
-POLICIES = {
-    "exponential": (Exponential(KEEP), exponential),
-    "SIFt": (SIFt(KEEP), subspace),
-}
+POLICIES = {"exponential": (Exponential(KEEP), exponential), "SIFt": (SIFt(KEEP), subspace)}
 
 
 def samples(n, count, seed=0):

@@ -297,11 +297,7 @@ NETWORK = "127.0.0.2"
 def shared(source):
     """A shared page: its player, the address that steers, and the audience's."""
     player = Player(source, Feed())
-    with (
-        player,
-        PageServer(player) as host,
-        PageServer(player, host=NETWORK, steers=False) as audience,
-    ):
+    with player, PageServer(player) as host, PageServer(player, host=NETWORK, steers=False) as audience:
         yield player, host, audience
 
 

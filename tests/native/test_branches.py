@@ -110,10 +110,7 @@ def check(taken, unreachable):
 @pytest.mark.skipif(not (shutil.which("gcc") and shutil.which("gcov")), reason="there is no gcc with gcov")
 @pytest.mark.parametrize(
     ("law", "ticks", "least", "unreachable"),
-    [
-        ("force", 400_000, 300, IN_FORCE_LOOP),
-        ("squares", 20_000, 35, IN_SQUARES),
-    ],
+    [("force", 400_000, 300, IN_FORCE_LOOP), ("squares", 20_000, 35, IN_SQUARES)],
 )
 def test_recorded_ticks_take_every_branch_that_there_is_a_way_to(
     law, ticks, least, unreachable, request, tmp_path

@@ -12,17 +12,7 @@ import sys
 from typing import Any
 
 import numpy as np
-from tool_axis_arm import (
-    REST,
-    Joints,
-    ToolAxisArm,
-    arm_of,
-    loopback,
-    ready,
-    ticks,
-    turns,
-    words_of,
-)
+from tool_axis_arm import REST, Joints, ToolAxisArm, arm_of, loopback, ready, ticks, turns, words_of
 
 from palpate.errors import InputError
 

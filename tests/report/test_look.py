@@ -13,16 +13,7 @@ from hypothesis import strategies as st
 
 from palpate.errors import InputError
 from palpate.report import style
-from palpate.report.look.assets import (
-    CHARTS,
-    DATA,
-    PAIRS,
-    SERIES,
-    data,
-    policy,
-    scripts,
-    styles,
-)
+from palpate.report.look.assets import CHARTS, DATA, PAIRS, SERIES, data, policy, scripts, styles
 from palpate.report.page import render
 
 GROUNDS = ("paper", "card")

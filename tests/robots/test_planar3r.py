@@ -1,4 +1,4 @@
-"""The arm against Lagrange, against MuJoCo, against itself, and against bad input."""
+"""The arm against MuJoCo, against itself, and against bad input."""
 
 import re
 
@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from palpate._vector import Vec3
 from palpate.errors import InputError
 from palpate.robots import Arm3, Planar3R
-from robots import derivation
 from robots.mujoco_arm import Oracle
 
 THESIS = Planar3R()
@@ -33,20 +32,12 @@ angles = st.floats(-np.pi, np.pi)
 
 
 @ARMS
-@pytest.mark.parametrize("state", STATES)
-def test_lagrange_agrees(robot, state):
-    q, qd, qdd, _ = state
-    found = {
-        "pose": robot.forward_kinematics(q),
-        "J": robot.jacobian(q),
-        "Jdot": robot.jacobian_dot(q, qd),
-        "M": robot.mass_matrix(q),
-        "h": robot.bias_torque(q, qd),
-        "tau": robot.inverse_dynamics(q, qd, qdd),
-    }
-    for name, value in found.items():
-        expected = derivation.evaluated(name, robot.arm, q, qd, qdd)
-        np.testing.assert_allclose(value, expected, rtol=0.0, atol=1e-11, err_msg=name)
+def test_the_rate_of_the_jacobian_is_its_derivative(robot):
+    """Along a motion, by central differences; the Jacobian itself, the pose's angle aside, is MuJoCo's below."""
+    q, qd, step = STATES[:, 0], STATES[:, 1], 1e-6
+    slope = (robot.jacobian(q + step * qd) - robot.jacobian(q - step * qd)) / (2.0 * step)
+    np.testing.assert_allclose(robot.jacobian_dot(q, qd), slope, atol=1e-8)
+    np.testing.assert_allclose(robot.forward_kinematics(q)[:, 2], q.sum(axis=1), atol=1e-12)
 
 
 @ARMS
@@ -197,11 +188,6 @@ def test_elbow_is_a_sign(elbow):
 def test_an_arm_of_impossible_numbers_is_refused(name, value):
     with pytest.raises(InputError, match=f"{name} of an arm must be positive and finite"):
         Planar3R(Arm3(**{name: Vec3(1.0, value, 1.0)}))
-
-
-def test_whole_numbers_become_floats():
-    arm = Planar3R(Arm3(length=Vec3(1, 1, 1))).arm
-    assert all(isinstance(v, float) for field in arm for v in field)
 
 
 def test_batches_of_any_shape_and_elbows_as_arrays():

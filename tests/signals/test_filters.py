@@ -62,10 +62,7 @@ def test_butterworth2_is_the_textbooks(cutoff):
 
 @pytest.mark.parametrize(
     ("cutoff", "printed"),
-    [
-        (120.0, (0.0913, 0.1826, 0.0913, 0.9824, -0.3477)),
-        (35.0, (0.0104, 0.0209, 0.0104, 1.691, -0.7327)),
-    ],
+    [(120.0, (0.0913, 0.1826, 0.0913, 0.9824, -0.3477)), (35.0, (0.0104, 0.0209, 0.0104, 1.691, -0.7327))],
 )
 def test_butterworth2_has_the_coefficients_of_appendix_e(cutoff, printed):
     b = butterworth2(cutoff, RATE)

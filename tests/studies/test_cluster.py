@@ -51,16 +51,14 @@ def on(address, folder, **options):
 
 @pytest.mark.long
 def test_two_workers_make_the_table_that_threads_make_and_one_may_die(cluster, tmp_path, here):
-    assert on(cluster.address, tmp_path / "both") == here
+    def die(finished):
+        if finished >= 20:
+            cluster.workers[0].kill()
 
-    def kill():
-        time.sleep(0.3)
-        cluster.workers[0].kill()
-
-    killer = threading.Thread(target=kill)
-    killer.start()
-    assert on(cluster.address, tmp_path / "one") == here
-    killer.join()
+    runner = Cluster(cluster.address)
+    Work(planned(MORE), MORE, tmp_path / "out", runner, die).run()
+    runner.close()
+    assert (tmp_path / "out" / "results.parquet").read_bytes() == here
     assert cluster.workers[0].wait() != 0
 
 
@@ -174,7 +172,3 @@ def test_workers_run_a_controller_of_ones_own(tmp_path, capsys, monkeypatch, roo
         assert main([*words, "--out", "there", "--scheduler", running.address]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["results"] == {"done": 2}
-    assert main([*words, "--out", "here"]) == 0
-    assert (tmp_path / "there" / "results.parquet").read_bytes() == (
-        tmp_path / "here" / "results.parquet"
-    ).read_bytes()

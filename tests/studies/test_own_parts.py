@@ -20,8 +20,7 @@ pytestmark = pytest.mark.usefixtures("permitted")
 
 METRIC = '["force_rms", "own_parts:mean_force"]'
 OWN = text(
-    '[parameters.law.cases]\nmine = { controller = { kind = "own_parts:Push" } }\nPI = {}',
-    metrics=METRIC,
+    '[parameters.law.cases]\nmine = { controller = { kind = "own_parts:Push" } }\nPI = {}', metrics=METRIC
 )
 IDENTIFIED = text(
     '"identifier.memory" = [480, 960]',

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from palpate.cli import main
 from palpate.force import ForceLoop
 from palpate.logs import read_record
 from wires.slow_cell import ALONE, DOMAIN, KINDS, PATIENCE, child, standing, while_it_presses
@@ -36,7 +37,7 @@ def kept(here):
 
 
 @pytest.mark.parametrize("kind", ["franka", "rtde", "ros2"])
-def test_a_controller_that_starts_again_in_mid_press_ends_it(folders, here, kind):
+def test_a_controller_that_starts_again_in_mid_press_ends_it(folders, here, capsys, kind):
     """Another process takes its place at the same address at once; the press is not taken up with that one."""
     again = []
     with standing(kind, folders, "--gap", "0.05") as (process, words):
@@ -51,7 +52,9 @@ def test_a_controller_that_starts_again_in_mid_press_ends_it(folders, here, kind
         try:
             begun = while_it_presses(here / "rec" / "rows.f64", restart)
             code, told, ended = pressed(words, here)
-            assert again[0].poll() is None  # it is there, and stays
+            assert again[0].poll() is None  # it is there, and stays, and is met by the next command
+            assert main([*words, "--dry-run"]) == 0
+            assert json.loads(capsys.readouterr().out)["rate_Hz"] > 90.0
         finally:
             for one in again:
                 one.kill()

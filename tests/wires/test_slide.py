@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 
 import msgspec
 import numpy as np
@@ -230,9 +229,3 @@ def test_a_slide_ends_where_one_axis_is_no_number(folder, here, capsys, at):
     record = read_record(here / "rec" / "record.parquet")
     assert len(record) > 200
     assert record["phase"].max() == 3.0  # it was sliding
-
-
-def test_a_task_without_a_path_is_a_press(folder):
-    order = order_of(folder, path=None)
-    assert replace(order.task, path=PATH).path is PATH
-    assert order.task.path is None

@@ -36,19 +36,8 @@ def spoiled_press(kind, fault, folder, where, *more):
     if find_spec(LIBRARIES[kind]) is None:
         pytest.skip(f"{LIBRARIES[kind]} is not installed")
     theta = ForceLoop.load(folder / "gains.toml").gains.theta
-    arm = (
-        REHEARSAL / f"{kind}_arm.py",
-        "--address",
-        ARM,
-        "--arm",
-        folder / "arm.toml",
-        "--seconds",
-        "60",
-    )
-    with (
-        child(*arm, "--gap", "0.002", *more) as (_, line),
-        child(RELAY, kind, OWN, ARM, fault) as (relay, _),
-    ):
+    arm = (REHEARSAL / f"{kind}_arm.py", "--address", ARM, "--arm", folder / "arm.toml", "--seconds", "60")
+    with child(*arm, "--gap", "0.002", *more) as (_, line), child(RELAY, kind, OWN, ARM, fault) as (relay, _):
         assert line == f"{kind}:{ARM}"
         words = [
             "press",

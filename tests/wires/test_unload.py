@@ -176,7 +176,6 @@ def test_without_a_believable_force_the_way_back_is_the_way_that_it_came(folder,
     how = run.outcome.unloading
     assert not how.free
     assert "without a believable force" in how.how
-    came = GAP + max(r for r in (run.rows.record()["x_command"]))  # noqa: F841 - shown where the next line fails
     assert how.distance == pytest.approx(run.rows.record()["x_command"].max() + 0.002, abs=1e-3)
 
 
@@ -221,10 +220,7 @@ def test_an_arm_that_its_own_watchdog_has_stopped_is_taken_over_again(folder):
 
 @pytest.mark.parametrize(
     ("limits", "says"),
-    [
-        ({"travel": 0.004}, "from the start"),
-        ({"seconds": 4.0, "hold": 3.0}, "the time limit of 4 s is over"),
-    ],
+    [({"travel": 0.004}, "from the start"), ({"seconds": 4.0, "hold": 3.0}, "the time limit of 4 s is over")],
 )
 def test_a_limit_of_travel_or_time_leaves_no_force(folder, limits, says):
     run = faulty(folder, lambda wire, sense: sense, **limits)
@@ -345,10 +341,9 @@ def test_an_obstacle_behind_the_tip_ends_the_retreat(folder):
     assert -run.rows.record()["force_sampled"].min() < 10.0 + 2e3 * 0.05 * 0.3
 
 
-@pytest.mark.parametrize("seed", range(8))
-@pytest.mark.parametrize("gap", [0.05])
-def test_a_press_that_meets_nothing_has_touched_nothing(folder, seed, gap):
-    run = Run(folder, layer=None, gap=gap, seed=seed, travel=0.03, speed=0.05, desired=10.0, force=25.0)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_press_that_meets_nothing_has_touched_nothing(folder, seed):
+    run = Run(folder, layer=None, gap=0.05, seed=seed, travel=0.03, speed=0.05, desired=10.0, force=25.0)
     assert not run.outcome.ok
     assert not run.outcome.touched
     assert run.outcome.stiffness is None

@@ -7,7 +7,6 @@ import pytest
 
 from palpate.controllers import hybrid, neural
 from palpate.identifiers import neural_probe
-from palpate_thesis import diagram
 from palpate_thesis.blocks import blocks_of, read_blocks
 from palpate_thesis.figures import fig_4_03
 from palpate_thesis.figures import fig_4_05_5_03 as diagrams
@@ -65,11 +64,3 @@ def test_networks_are_drawn_with_all_their_neurons_and_inputs():
         dots = [line for line in axis.lines if line.get_marker() == "o"]
         assert sum(len(np.asarray(line.get_xdata())) for line in dots) == neurons
         assert len(axis.lines) - len(dots) == weights
-
-
-@pytest.mark.parametrize("start", [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0)])
-def test_a_wire_ends_at_the_edges_of_its_blocks(start):
-    end = (4.0, 3.0) if start != (1.0, 0.0) else (1.0, 3.0)
-    points = diagram.route(start, end)
-    for (x, y), (cx, cy) in ((points[0], start), (points[-1], end)):
-        assert np.isclose(abs(x - cx), diagram.WIDTH / 2) or np.isclose(abs(y - cy), diagram.HEIGHT / 2)

@@ -9,9 +9,8 @@ from scipy import signal
 from palpate.bench import load, with_values
 from palpate.instruments import force_sensor
 from palpate.signals.filters import butterworth2
-from palpate_thesis.explanations import e6_friction_compensation as compensation
 from palpate_thesis.figures.fig_4_03 import LoopParameters
-from palpate_thesis.runs import SHORT, Runs, rougher
+from palpate_thesis.runs import SHORT
 
 FOAM = with_values(load("foam-hybrid"), {**SHORT, "run.press": 1.2})
 
@@ -78,45 +77,5 @@ def test_without_gain_every_surface_is_stable():
     assert LoopParameters(0.0, 0.0, 60.0, 8.2).limit() == np.inf
 
 
-def test_damping_and_lower_gains_bear_stiffer_surfaces():
-    limits = [LoopParameters(kf, 0.003, 60.0, 8.2).limit() for kf in (2.0, 1.0, 0.5, 0.25)]
-    assert limits == sorted(limits)
-    limits = [LoopParameters(1.0, 0.003, b, 8.2).limit() for b in (30.0, 60.0, 120.0, 240.0)]
-    assert limits == sorted(limits)
-    assert (
-        LoopParameters(1.0, 0.003, 60.0, 8.2, late=0.010).limit()
-        < LoopParameters(1.0, 0.003, 60.0, 8.2).limit()
-    )
-
-
 def test_a_hopeless_loop_has_no_limit():
     assert np.isnan(LoopParameters(400.0, 0.003, 60.0, 8.2).limit())
-
-
-def test_the_listings_rule_stays_at_zero_and_would_show_if_it_did_not():
-    record = Runs((0,)).record(compensation.PLAIN)
-    assert compensation.listing_factor(record) < 1e-6
-    slow = {f"q{i}": record[f"q{i}"] for i in (1, 2, 3)}
-    finer = with_values(compensation.PLAIN, {"encoders.counts": (6.144e8, 4.096e8, 2e6)})
-    patched = type(record)({**record.columns, **slow}, record.units, record.meta)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(compensation, "PLAIN", finer)
-        assert compensation.listing_factor(patched) > 0.5
-
-
-def test_compensation_that_acts_lessens_the_error_and_a_short_blend_shakes():
-    plain, wide, short = (
-        compensation.held_in(Runs((0,)).record(e))
-        for e in (
-            compensation.PLAIN,
-            compensation.PARAMETERS,
-            compensation.with_blend(compensation.PARAMETERS, 0.002),
-        )
-    )
-    assert wide.error < 0.5 * plain.error
-    assert short.shaking > 5 * plain.shaking
-
-
-def test_rougher_friction_is_what_it_says():
-    half = with_values(FOAM, rougher(FOAM, 0.5))
-    assert half.friction.coulomb == tuple(0.5 * v for v in FOAM.friction.coulomb)

@@ -48,8 +48,7 @@ def test_a_median_may_move_within_the_range_and_nothing_else_may():
 
 @pytest.mark.timeout(900)  # of one run of minutes, on a machine that others use
 @pytest.mark.parametrize(
-    "number",
-    [pytest.param(n, marks=() if n in QUICK else pytest.mark.long) for n in FROZEN],
+    "number", [pytest.param(n, marks=() if n in QUICK else pytest.mark.long) for n in FROZEN]
 )
 def test_a_study_comes_to_what_it_came_to(number, tmp_path):
     """Its claims, each with all it has to say, and its figure; of two seeds, where all take long."""

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 
 from cli.json_keys import documented
 from palpate.bench import Experiment, build, with_values
-from palpate.bench.summary import CONTACT
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate_thesis.claims import (
@@ -26,7 +25,7 @@ from palpate_thesis.claims import (
 from palpate_thesis.figure import studies, study
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, SINE
 from palpate_thesis.inference import search
-from palpate_thesis.inference.search import GENERATION, STATE, LaboratorySearch, TriedLaboratory
+from palpate_thesis.inference.search import GENERATION, STATE, LaboratorySearch
 from palpate_thesis.inference.sentences import HOLDS, halves, sentences
 from palpate_thesis.inference.trial import Trial
 from palpate_thesis.laboratory import (
@@ -41,13 +40,12 @@ from palpate_thesis.laboratory import (
     laboratory_from,
     laboratory_text,
     load_laboratory,
-    prior_fractions,
     stiffening,
 )
 from palpate_thesis.least_squares import panels, press_runs
 from palpate_thesis.measure import MeasurementFormat, measure
 from palpate_thesis.neural_identifier.network import NetworkPress
-from palpate_thesis.runs import Runs, rougher
+from palpate_thesis.runs import Runs
 
 
 def test_every_unknown_is_a_field_with_a_range_that_holds_its_own_ends():
@@ -57,15 +55,6 @@ def test_every_unknown_is_a_field_with_a_range_that_holds_its_own_ends():
         assert u.low < u.high
         assert u.quantile(0.0) == pytest.approx(u.choices[0] if u.choices else u.low)
         assert u.quantile(1.0) == pytest.approx(u.choices[-1] if u.choices else u.high)
-
-
-def test_the_hand_chosen_bench_lies_in_the_ranges():
-    assert laboratory_from(BENCH.numbers(), "bench") == BENCH
-
-
-def test_a_value_comes_back_from_its_fraction_of_the_prior():
-    lab = laboratory_at([0.3] * len(UNKNOWNS))
-    assert laboratory_at(prior_fractions(lab)).numbers() == pytest.approx(lab.numbers())
 
 
 @pytest.mark.long
@@ -79,30 +68,6 @@ def test_a_plausible_laboratory_shows_the_sentence_that_it_was_chosen_for(senten
 @pytest.mark.parametrize("experiment", [FOAM, RUBBER, press_runs.PLAIN, press_runs.RELAXING])
 def test_the_hand_chosen_bench_changes_nothing(experiment: Experiment):
     assert BENCH.adapt(experiment) == experiment
-
-
-def test_what_a_figure_varies_is_varied_about_the_laboratorys_own_value():
-    lab = Laboratory(friction=0.5, foam_damping=100.0)
-    twice = lab.adapt(with_values(FOAM, {**rougher(FOAM, 2.0), "surface.damping": 400.0}))
-    assert twice.friction.coulomb == pytest.approx(FOAM.friction.coulomb)
-    assert twice.surface.damping == pytest.approx(200.0)
-
-
-def test_a_laboratory_changes_what_it_names():
-    lab = Laboratory(
-        wall=0.48,
-        noise=0.3,
-        restart=0.0,
-        arm_stiffness=1e5,
-        asymmetry=0.2,
-    )
-    e = lab.adapt(with_values(FOAM, SINE))
-    assert e.wall.x - e.robot.start[0] == pytest.approx(FOAM.wall.x - FOAM.robot.start[0])
-    assert e.force_sensor.noise == pytest.approx(0.3)
-    assert e.force.restart == 0.0
-    assert e.elastic is not None
-    assert e.elastic.stiffness == 1e5
-    assert e.friction.asymmetry == 0.2
 
 
 TRIED = {
@@ -128,30 +93,6 @@ def test_every_unknown_enters_some_experiment(unknown: Unknown):
     base = replace(laboratory_at([0.4] * len(UNKNOWNS)), foam_law=law.get(unknown.name, LINEAR))
     other = replace(base, **{unknown.name: unknown.quantile(0.9)})
     assert any(base.adapt(e) != other.adapt(e) for e in TRIED.values())
-
-
-@pytest.mark.parametrize(
-    ("case", "of"),
-    [
-        ("foam press", {"foam_law": STIFFENING}),
-        ("foam press", {"foam_law": RELAXING}),
-        ("foam press", {"roughness": 50.0}),
-        ("foam press", {"arm_stiffness": 1e5, "arm_frequency": 30.0}),
-        ("foam press", {"asymmetry": 0.3}),
-        ("foam press", {"beyond": 0.2}),
-        ("sine on foam", {"restart": 0.0}),
-        ("foam press", {"compensation": 0.8, "blend": 0.05}),
-    ],
-    ids=str,
-)
-def test_what_no_figure_had_tried_changes_the_runs(case: str, of: dict[str, float]):
-    press = 5.5 if "restart" in of else 0.5  # the clock starts anew after 5 s
-    short = with_values(TRIED[case], {"run.press": press, "run.steps": 5})
-    bench, other = (build(lab.adapt(short)).run(60.0, 0, press=press) for lab in (BENCH, Laboratory(**of)))
-    force = [record["force_measured"][record["phase"] == CONTACT] for record in (bench, other)]
-    rows = min(map(len, force))
-    assert rows > 100
-    assert not np.allclose(force[0][:rows], force[1][:rows])
 
 
 @pytest.mark.long
@@ -205,13 +146,6 @@ def test_a_laboratory_comes_back_from_its_file(tmp_path):
     path.write_text(laboratory_text(lab, 'about "it"', "palpate laboratory --seed 1"))
     assert load_laboratory(str(path)) == lab
     assert laboratory_from({}, "nothing") == BENCH
-
-
-def test_each_surface_and_each_controller_stands_in_both_halves():
-    for half in ("calibration", "validation"):
-        ids = " ".join(s.id for s in halves()[half])
-        for word in ("foam", "rubber", "least-squares", "network", "neural-foam", "neural-rubber"):
-            assert word in ids, (half, word)
 
 
 def test_sentences_are_claims_of_their_figures_and_each_has_a_law():
@@ -282,15 +216,6 @@ def test_half_searches_by_the_calibration_half_alone(tmp_path, rule):
     LaboratorySearch(tmp_path / "half", "palpate laboratory", tries=16, half=True).run()
     calibration = {s.id for s in halves()["calibration"]}
     assert {name for one in tried(tmp_path / "half") for name in one.true} <= calibration
-
-
-def test_a_child_differs_from_a_parent_in_a_few_unknowns():
-    parents = [TriedLaboratory((fraction,) * len(UNKNOWNS), ()) for fraction in (0.25, 0.75)]
-    rng = np.random.default_rng(0)
-    for _ in range(50):
-        child = np.array(search._make_child(parents, rng))
-        kept = max(np.sum(child == 0.25), np.sum(child == 0.75))
-        assert len(UNKNOWNS) - search.MAX_REDRAWN <= kept < len(UNKNOWNS)
 
 
 def test_a_state_of_another_search_is_refused(tmp_path, rule):

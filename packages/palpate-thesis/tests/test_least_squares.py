@@ -1,14 +1,12 @@
 """The figures of least squares: what they measure against cases with known answers, and that each figure stands."""
 
-import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palpate.bench import build
 from palpate.identifiers import RecursiveLeastSquares
-from palpate.instruments import analog_filter_190, force_sensor
+from palpate.instruments import analog_filter_190
 from palpate.records import Record
 from palpate_thesis.explanations import e1_why_negative_mass as bias
 from palpate_thesis.figures import fig_3_05, fig_3_07, fig_4_02
@@ -136,25 +134,6 @@ def test_the_ratios_find_a_surface_without_noise_that_is_measured_from_its_face(
     assert heavy["M"][1] == pytest.approx(M, rel=0.05)
 
 
-def test_the_ratios_are_ruined_by_the_offset_and_by_noise():
-    s = pushed()
-    s["x"] = s["x"] - 5e-4
-    s["f"] = s["f"] + np.random.default_rng(1).normal(0.0, 0.4, len(s["f"]))
-    found = steady_state.by_ratios(as_press(s))
-    assert found["K"][1] > 1.1 * K
-    assert found["B"][2] - found["B"][0] > B
-    assert found["M"][2] - found["M"][0] > 10.0 * M
-
-
-@pytest.mark.parametrize("experiment", [press_runs.PLAIN, press_runs.RELAXING, press_runs.RUBBER])
-def test_every_condition_can_be_built_and_changes_something(experiment):
-    varied = press_runs.conditions(experiment)
-    assert len({msgspec.json.encode(e) for e in (experiment, *varied.values())}) == len(varied) + 1
-    for e in varied.values():
-        build(e)
-        assert e.robot.start[0] < e.wall.x
-
-
 def test_where_a_claim_fails_is_told(press):
     del press
     good, bad = (press_runs.PressEstimates(*[1.0] * 8, settled, 0.0, 0.0, 200.0) for settled in (1.0, 9.0))
@@ -177,34 +156,6 @@ def test_a_late_force_shifts_mass_and_damping_as_the_formula_says():
     assert mass - M == pytest.approx(expected[0] - M, rel=0.15)
     assert damping - B == pytest.approx(expected[1] - B, rel=0.1)  # of third order is left
     assert mass < M < expected[0] + B * lag
-
-
-def test_each_cause_changes_the_estimate_and_all_of_them_make_the_thesis_estimate(foam):
-    seen = bias.window(foam)
-    perfect = bias.estimate(seen, ())
-    alone = {name: bias.estimate(seen, (name,)) for name in bias.CAUSES}
-    assert all(not np.allclose(found, perfect, rtol=1e-5) for found in alone.values())
-    assert alone["lag"][0] < -0.3 < perfect[0]
-    at = int(np.argmax(foam["phase"] == 1.0)) + 3999
-    recorded = [foam[f"{key}_thesis"][at] for key in "MBK"]
-    np.testing.assert_allclose(bias.estimate(seen, tuple(bias.CAUSES)), recorded, rtol=1e-3, atol=2e-3)
-
-
-def test_the_sensor_off_line_is_the_sensor_of_the_bench():
-    rate, seconds = 20000, 0.6
-    t = np.arange(round(rate * seconds)) / rate
-    force = 10.0 * (1.0 - np.cos(2.0 * np.pi * 3.0 * t))
-    sensor = force_sensor(noise=0.0, rate=rate, bits=24)
-    state, out = sensor.start(), []
-    for k, f in enumerate(force):
-        held, state = sensor.sample(state, float(f), k, 0.0)
-        out.append(held)
-    bench = np.array(out)[::20]
-    off_line = bias.through_sensor(force[::20])
-    # The hold makes stairs of 2 ms, at most 0.2 N high here; off line there is their mean.
-    assert np.abs(bench - off_line)[50:].max() < 0.25
-    assert np.abs(bench - off_line)[50:].mean() < 0.1
-    assert np.abs(bench - force[::20])[50:].max() > 0.8
 
 
 def test_the_filters_gain_is_that_of_the_printed_transfer_function():

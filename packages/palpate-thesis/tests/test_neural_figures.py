@@ -13,7 +13,6 @@ from palpate.studies.metrics.following import LIMIT
 from palpate.studies.metrics.window import SETTLE
 from palpate_thesis.explanations import e2_integrator, e3_divergence
 from palpate_thesis.figures import fig_6_10, fig_6_11_17, fig_6_14, fig_6_15
-from palpate_thesis.force_control.interventions import watch
 from palpate_thesis.force_control.tracking import (
     FOAM,
     RUBBER,
@@ -23,7 +22,7 @@ from palpate_thesis.force_control.tracking import (
     tracking,
     variations,
 )
-from palpate_thesis.runs import Runs, move_wall, rougher, stops_holding
+from palpate_thesis.runs import move_wall, rougher, stops_holding
 
 TICK = 1e-3
 
@@ -40,12 +39,6 @@ def pressed(force, seconds=10.0, before=0.2, **columns) -> Record:
     table["force"] = table["force_measured"] = force(since, desired)
     table.update(columns)
     return Record(table, COLUMNS, {"experiment": {"force": {"period": 2.5}}, "end": "done"})
-
-
-def test_a_perfect_force_follows():
-    found = tracking(0.0, 10.0)(pressed(lambda t, d: d))
-    assert found == Tracking(0.0, 0.0, 0.0, 0.0, 0)
-    assert found.follows
 
 
 def test_errors_right_after_a_step_are_not_judged_and_later_ones_are():
@@ -148,49 +141,6 @@ def test_the_gain_of_an_integrator_is_found_under_noise():
     error = (record["force_desired"] - record["force_measured"]) * pressing
     record.columns["memory_fx"][1:] = 7.0 * TICK * np.cumsum(error)[:-1]
     assert e2_integrator.fit_integral_gain(record) == pytest.approx(7.0, rel=1e-9)
-
-
-def test_watching_sees_the_run_of_the_bench():
-    """Chunks and looks must not change what happens: the last row is the one of the recorded run."""
-    experiment = with_values(FOAM, {"run.press": 2.0})
-    record = Runs(range(1)).record(experiment)
-    seen = []
-    lost = watch(
-        experiment, 0, 2.0, lambda one: seen.append((one.rows[-1].copy(), one.neural.network.weights.copy()))
-    )
-    assert lost is None
-    assert len(seen) >= 2
-    row = seen[0][0]
-    at = round(row[0] / TICK)
-    assert row.tolist() == [record[name][at] for name in COLUMNS]
-    assert not np.array_equal(seen[0][1], seen[1][1])
-
-
-def test_a_network_that_loses_contact_is_noticed():
-    """The relaxing foam at ten times the listing's rate: lost at once, while the bench's PI holds."""
-    wild = with_values(e3_divergence.RELAXING, {"controller.learning_rate": 1e-3})
-    lost = watch(wild, 0, 10.0, lambda one: None)
-    assert lost is not None
-    assert 0.0 < lost < 10.0
-    assert watch(with_values(wild, e2_integrator.PI), 0, 10.0, lambda one: None) is None
-
-
-def test_sizes_of_the_weights_add_up():
-    from palpate.controllers import Neural
-    from palpate.networks import Perceptron
-
-    neural = Neural.thesis()
-    sizes = e3_divergence.weight_norms(neural.start())
-    perceptron = Perceptron.thesis()
-    parts = (
-        perceptron.hidden_weights[:, 7:],
-        perceptron.hidden_weights[:, 1:7],
-        perceptron.hidden_weights[:, 0],
-    )
-    assert sizes[:3] == pytest.approx([np.linalg.norm(part) for part in parts])
-    assert sizes[3:] == pytest.approx(
-        [np.linalg.norm(perceptron.output[0, 1:]), np.linalg.norm(perceptron.output[:, 0])]
-    )
 
 
 def test_torque_gains_are_the_slope_of_the_network():

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from palpate_thesis.drawing import apply_look
-from palpate_thesis.figures import fig_6_06, fig_6_07_09
+from palpate_thesis.figures import fig_6_06
 from palpate_thesis.neural_identifier import claims, network
 from palpate_thesis.neural_identifier.network import NetworkAnswer, NetworkChoice, NetworkPress
-from palpate_thesis.runs import Runs
 
 STIFFNESS = 6000.0
 GOOD = NetworkAnswer(
@@ -54,20 +52,6 @@ def test_an_error_is_gone_when_its_running_mean_stays_small():
     assert network.error_gone(np.full(4000, 2.0)) == np.inf
     assert network.error_gone(np.full(4000, np.nan)) == np.inf
     assert network.error_gone(5.0 * (-1.0) ** np.arange(4000)) < 0.01  # noise is no error
-
-
-def test_a_straight_network_through_zero_answers_the_springs_stiffness():
-    found = network.answer(spring(), NetworkChoice(200.0, 0.1, thresholds=False), start=0)
-    assert found.at_zero == 0.0
-    assert pytest.approx(1.0, abs=0.06) == found.over
-    assert pytest.approx(STIFFNESS, rel=0.2) == found.tangent
-
-
-def test_thresholds_that_learn_put_an_offset_into_the_stiffness():
-    found = network.answer(spring(), NetworkChoice(), start=0)
-    assert found.at_zero > 3.0  # a spring has none
-    assert found.over > 1.15
-    assert found.tangent < 0.7 * STIFFNESS
 
 
 def test_the_tangent_is_the_derivative_of_the_networks_force():
@@ -151,22 +135,3 @@ def test_a_rate_is_too_large_when_all_beyond_it_are_stuck_too():
     by_rate = {rate: stuck if rate in (1e-3, 3e-2, 1e-1) else [GOOD] for rate in fig_6_06.RATES}
     assert fig_6_06.stuck_from(by_rate) == 3e-2
     assert fig_6_06.stuck_from({rate: [GOOD] for rate in fig_6_06.RATES}) == np.inf
-
-
-@pytest.mark.parametrize(
-    "study", [fig_6_06, pytest.param(fig_6_07_09.ERROR, marks=pytest.mark.long)], ids=lambda one: one.NUMBER
-)
-def test_a_study_runs_and_says_why(study):
-    """By one seed; what all come to over ten: test_frozen_claims.py."""
-    data = study.run(Runs(seeds=(3,)))
-    claims = study.check(data)
-    assert claims
-    for claim in claims:
-        assert len(claim.note) > 150
-        assert "nan" not in claim.measured + claim.note
-        assert all((claim.tolerance, claim.thesis, claim.measured))
-    with apply_look():
-        drawing = study.plot(data)
-    lettered = [axis for axis in drawing.axes if axis.get_title(loc="left").startswith("(")]
-    assert lettered == (drawing.axes if len(drawing.axes) > 1 else [])
-    drawing.canvas.draw()

@@ -13,10 +13,7 @@ URDF = Path(__file__).with_name("gantry.urdf")
 
 def every_arm():
     """The four arms by name, and a user's URDF with prismatic joints."""
-    return {
-        **{name: SerialArm.named(name) for name in NAMES},
-        "gantry": SerialArm.from_urdf(URDF, "probe"),
-    }
+    return {**{name: SerialArm.named(name) for name in NAMES}, "gantry": SerialArm.from_urdf(URDF, "probe")}
 
 
 def states(arm, count, seed=0):
