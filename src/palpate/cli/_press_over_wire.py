@@ -71,7 +71,7 @@ def press_over(
         raise InputError(f"{options.record} exists; choose another place for --record")
     assert request.gains is not None
     loop = ForceLoop.load(request.gains, options.certificate)
-    check_same_force_max(loop.gains, si(request.force_max))
+    check_same_force_max(loop.gains.force_max, si(request.force_max))
     if path is not None:
         if si(options.free_stroke):
             raise InputError("--free-stroke is for a press; leave it out, or give 0")

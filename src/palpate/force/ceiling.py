@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from functools import lru_cache
 from math import exp, pi, sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,9 +26,6 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, Sensor
 from palpate.force.sampled_loop import filter_of
-
-if TYPE_CHECKING:
-    from palpate.force.gains import Gains
 
 LATE_TICKS = 1
 """Ticks by which a reading, or a command, may be later than arm and sensor state: the jitter of one tick that a
@@ -78,14 +74,14 @@ def usual_force_max(force: float, sensor: Sensor) -> float:
     return min(FORCE_MAX_RATIO * force, sensor.full_scale)
 
 
-def check_same_force_max(gains: Gains, force_max: float | None) -> None:
-    """Refuse another F_max than the one that gains were tuned for.
+def check_same_force_max(tuned: float | None, force_max: float | None) -> None:
+    """Refuse another F_max [N] than the one that gains were tuned for [N].
 
     Raises:
         InputError: it names both.
     """
-    if force_max is not None and force_max != gains.force_max:
-        known = "no F_max" if gains.force_max is None else f"F_max = {gains.force_max:g} N"
+    if force_max is not None and force_max != tuned:
+        known = "no F_max" if tuned is None else f"F_max = {tuned:g} N"
         raise InputError(
             f"--force-max is {force_max:g} N, and the gains are for {known}; tune with --force-max {force_max:g}:N"
         )

@@ -296,7 +296,7 @@ def _gains(spec: PressSpec, arm: SerialArm, place: Place) -> Gains:
         gains = load_gains(spec.gains)
         check_mode(gains, spec.mode)
         _check_sensor(spec, gains.arm.sensor, gains.force_limit)
-        check_same_force_max(gains, spec.force_max)
+        check_same_force_max(gains.force_max, spec.force_max)
         return gains
     mode = spec.mode or usual_mode(spec.arm)
     if spec.controller != CAUTIOUS and spec.mode is None:
