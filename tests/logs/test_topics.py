@@ -363,6 +363,63 @@ def test_a_log_lacks_what_it_lacks_and_leads_to_what_it_is_good_for(tmp_path):
     assert "joints" in proposed(tmp_path, "time,q_0,q_1,tau_0,tau_1", t, x, 2 * x, 3 * x, x**2).guesses[0]
 
 
+def sliding(axes):
+    """Columns of a tip that touches at -z, presses with 2 to 10 N and slides with mu 0.3 along x."""
+    t = np.arange(0, 12, 4e-3)
+    rng = np.random.default_rng(0)
+    x = 0.02 * np.where(t > 3, np.sin(1.6 * (t - 3)), 0)
+    z = np.interp(t, [0, 1, 2, 8, 11, 12], [5e-3, 5e-3, -1e-3, -2e-3, -4e-4, -4e-4])
+    load = 5e3 * np.maximum(-z, 0)
+    ahead = np.gradient(x, t)
+    force = {"x": 0.3 * load * np.clip(ahead / 2e-3, -1, 1), "y": 0 * t, "z": -load}
+    place = {"x": x, "y": 1e-3 * x, "z": z}
+    return [
+        t,
+        *(force[a] + 0.02 * rng.standard_normal(len(t)) for a in axes),
+        *(1e3 * place[a] for a in axes),
+    ]
+
+
+@pytest.mark.parametrize("axes", ["xyz", "xz"])
+def test_a_slide_is_proposed_and_identified_as_one(tmp_path, capsys, axes):
+    path = tmp_path / "slide.csv"
+    names = ["time_s", *(f"f{a}_N" for a in axes), *(f"{a}_mm" for a in axes)]
+    np.savetxt(path, np.column_stack(sliding(axes)), "%.6f", ",", header=",".join(names), comments="")
+    assert main(["topics", str(path)]) == 0
+    shown = capsys.readouterr().out
+    assert "to identify the friction of the slide in it" in shown
+    assert ("fx_N:N,-,fz_N:N" in shown) == (axes == "xz")
+    assert main(["identify", str(path), "--json"]) == 1
+    answer = json.loads(capsys.readouterr().out)
+    assert "--wrench-frame base" in answer["guessed"]["command"]
+    low, high = answer["slide"]["friction"]["ci95"]
+    assert low < 0.3 < high
+    assert high - low < 0.05
+
+
+@pytest.mark.parametrize(
+    ("names", "motion"), [("t,qd,tau", "--velocity qd:rad/s"), ("t,q_rad,tau", "--position q_rad:rad")]
+)
+def test_a_force_against_the_motion_is_led_to_friction(tmp_path, capsys, names, motion):
+    t = np.arange(0, 20, 4e-3)
+    speed = 0.5 * np.sin(2.5 * t) + 0.2 * np.sin(0.9 * t)
+    torque = 2 * np.sign(speed) + 3 * speed + 0.05 * np.random.default_rng(0).standard_normal(len(t))
+    path = tmp_path / "joint.csv"
+    moved = speed if "qd" in names else 4e-3 * np.cumsum(speed)
+    np.savetxt(path, np.column_stack([t, moved, torque]), "%.6f", ",", header=names, comments="")
+    command = f"palpate identify {path} --time t {motion} --force-column tau:Nm --friction"
+    assert main(["topics", str(path)]) == 0
+    assert (
+        f"to identify the friction of the axis (guessed parts are listed below):\n  {command}"
+        in capsys.readouterr().out
+    )
+    assert main(["identify", str(path)]) == 2
+    assert command in capsys.readouterr().err
+    assert main([*command.split()[1:], "--json"]) == 0
+    low, high = json.loads(capsys.readouterr().out)["parameters"]["Fc"]["ci95"]
+    assert low < 2 < high
+
+
 @pytest.mark.parametrize(
     ("names", "pairs"),
     [

@@ -116,6 +116,7 @@ class Code(Enum):
     IRREGULAR_TIME = "The rows are not evenly spaced in time; both channels are resampled evenly."
     SATURATED = "A channel rests at its extreme while the other moves on: it is at the end of its range."
     UNIT_GUESS = "A unit was guessed: neither you nor the file states it."
+    SIGNALS_GUESSED = "Columns, units or axes were guessed: neither you nor the file states them."
     UNIT_STATED = "A unit was taken from the file's own statement, or from a column's name."
     UNIT_DOUBTFUL = "A unit is probably wrong: the press is unusual by it, or the column's name has another."
     TIME_DOUBTFUL = "The time is doubtful in this unit: it counts rows, or its rate is beyond any log's."
