@@ -150,9 +150,13 @@ def _try(log: Path, proposal: Proposal) -> tuple[Proposal, bool]:
     Raises:
         InputError: the command refuses the log.
     """
-    makers = {"rate": float, "join": Path, "robot_stiffness": lambda value: (float(value), 0.0)}
     options: dict[str, Any] = dict(proposal.options or {})
-    options |= {name: make(options[name]) for name, make in makers.items() if name in options}
+    if "rate" in options:
+        options["rate"] = float(options["rate"])
+    if "robot_stiffness" in options:
+        options["robot_stiffness"] = (float(options["robot_stiffness"]), 0.0)
+    if "join" in options:
+        options["join"] = Path(options["join"])
     if proposal.purpose == WEIGH:
         from palpate.contact_frame.tool_payload import weigh
 

@@ -91,6 +91,10 @@ class Linearisation:
         drift = problem.contacts.drift
         drift_modes = drift.bends(problem.time).T if drift is not None else ()
         drift_columns = {f"drift {i}": column for i, column in enumerate(drift_modes)}
+        ripple = problem.contacts.ripple
+        if ripple is not None:
+            waves = ripple.std * ripple.columns(problem.time, motion.moved(0, lag))
+            drift_columns |= {f"ripple {i}": column for i, column in enumerate(waves)}
         if LAG in model_columns:
             effect_slopes = _moved_by_lag(effects, theta, segments, dt)
             model_columns = model_columns | {LAG: model_columns[LAG] + effect_slopes}

@@ -18,6 +18,7 @@ from palpate.identification.slope import (
     Drag,
     loadings_in,
     loadings_read_later,
+    ripple_error,
     slope_between,
     tangent_at,
     upper_slope,
@@ -251,6 +252,12 @@ def gather_evidence(
         headline = _among_loadings(steady.headline, wider)
         headline = replace(headline, depth=headline.depth - problem.origin)
         press = at_constant_speed(steady, press, problem.origin)
+    ripple = ripple_error(wider)
+    if headline is not None and ripple is not None:
+        headline = replace(headline, stiffness=headline.stiffness.with_cause("ripple", ripple))
+    if press is not None and ripple is not None:
+        tangents = (replace(t, slope=t.slope.with_cause("ripple", ripple)) for t in press.tangent)
+        press = replace(press, tangent=tuple(tangents))
     series = SeriesSpring.of(options)
     if series is not None:
         spectrum = series.spectrum(spectrum)

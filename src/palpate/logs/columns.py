@@ -265,8 +265,8 @@ def direction_correlation(motion: ColumnStatistics, load: ColumnStatistics, *, s
     finite = np.isfinite(a) & np.isfinite(b)
     a, b = a[finite], b[finite]
     if not speed and len(a) > 4:
-        lag = 1 + int(np.count_nonzero(np.diff(a) == 0) // max(np.count_nonzero(np.diff(a)), 1))
-        rows = min(max(2 * lag, len(a) // 500), len(a) // 4)
+        moves = int(np.count_nonzero(np.diff(a)))
+        rows = min(max(2 * len(a) // max(moves, 1), len(a) // 500, 2), len(a) // 4)
         a, b = a[2 * rows :] - a[: -2 * rows], b[rows:-rows]
     moves = np.abs(a) > MIN_MOVING_FRACTION * np.max(np.abs(a), initial=0.0)
     signs, loads = np.sign(a[moves]), b[moves]
