@@ -80,7 +80,7 @@ class LogIdentifier:
             text = f"{'; '.join(guessed['guesses'])}. If that is right: {guessed['command']}"
             result = replace(result, warnings=(Warn(Code.SIGNALS_GUESSED, text), *result.warnings))
         if self.indenter is not None:
-            result = with_modulus(result, self.indenter, self.poisson, options.get("tolerance", 0.25))
+            result = with_modulus(result, self.indenter, self.poisson, options.get("tolerance", 0.25), along)
         return result, along
 
     def _complete(self, log: Path) -> "tuple[LogIdentifier, str, Mapping[str, Any] | None]":

@@ -73,8 +73,8 @@ class Ripple:
     def subtract(self, channels: Channels) -> Channels:
         """The channels less the ripple, with a warning."""
         raw = channels.raw
-        raw_time = raw.start + raw.dt * np.arange(len(raw.held_force))
-        raw_force = raw.held_force - self.parts @ self.columns(raw_time, raw.position)
+        raw_time: Array = raw.start + raw.dt * np.arange(len(raw.held_force), dtype=np.float64)
+        raw_force: Array = raw.held_force - self.parts @ self.columns(raw_time, raw.position)
         force = channels.force - self.parts @ self.columns(channels.time, channels.position)
         warnings = (*channels.warnings, Warn(Code.FORCE_RIPPLES, self.text))
         return replace(channels, force=force, raw=replace(raw, held_force=raw_force), warnings=warnings)
@@ -161,7 +161,7 @@ class _Fit:
             design = np.column_stack(
                 [flat(np.cos(wave * variable)), flat(np.sin(wave * variable)), *derivative]
             )
-            return design, np.linalg.lstsq(design, force, rcond=None)[0]
+            return design, np.asarray(np.linalg.lstsq(design, force, rcond=None)[0], np.float64)
 
         def loss(wave: float) -> float:
             design, theta = fit(wave)
@@ -177,7 +177,12 @@ class _Fit:
             wave += float(np.clip(theta[2], -step, step))
         residual = force - design @ theta
         noise = estimate_noise(residual, np.arange(len(force)), 3 + 2 * len(parts))
-        cov = noise.variance * len(force) / noise.effective * np.linalg.pinv(design.T @ design)
+        cov = (
+            noise.variance
+            * len(force)
+            / noise.effective
+            * np.asarray(np.linalg.pinv(design.T @ design), np.float64)
+        )
         explained = 1.0 - float(residual @ residual) / max(float(force @ force), 1e-300)
         moved = flat(np.concatenate([channels.position[rows] for rows in parts]))
         swing = moved - design[:, :2] @ np.linalg.lstsq(design[:, :2], moved, rcond=None)[0]
