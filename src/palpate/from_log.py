@@ -74,9 +74,9 @@ class LogIdentifier:
             options["force_sign"] = _SIDES[self.frame.force_sign]
         frame = replace(job.frame, payload=self.payload) if in_space else None
         result, along = identify_contact(record, frame, _between(job, options, samples), **options)
-        if guessed is None:
+        if not any("is a guess" in guess for guess in (guessed or {}).get("guesses", ())):
             result = accept_stated_units(result, record, _specs(job.signals))
-        else:
+        if guessed is not None:
             text = f"{'; '.join(guessed['guesses'])}. If that is right: {guessed['command']}"
             result = replace(result, warnings=(Warn(Code.SIGNALS_GUESSED, text), *result.warnings))
         if self.indenter is not None:

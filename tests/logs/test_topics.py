@@ -429,11 +429,8 @@ def test_a_force_against_the_motion_is_led_to_friction(tmp_path, capsys, names, 
             [("Displacement (mm):mm", "Load (N):N"), ("Displacement (mm).1:mm", "Load (N).1:N")],
         ),
         (
-            "approach time (s),approach z (mm),approach force (N),retract time (s),retract z (mm),retract force (N)",
-            [
-                ("approach z (mm):mm", "approach force (N):N"),
-                ("retract z (mm):mm", "retract force (N):N"),
-            ],
+            "first time (s),first z (mm),first force (N),second time (s),second z (mm),second force (N)",
+            [("first z (mm):mm", "first force (N):N"), ("second z (mm):mm", "second force (N):N")],
         ),
     ],
 )
@@ -465,16 +462,34 @@ def test_branches_in_volts_take_gain_rate_and_cantilever_of_the_header(tmp_path)
             f"{a:.4f},{b:.6f},{1000 - a:.4f},{c:.6f}\n" for a, b, c in zip(z, volts, volts[::-1], strict=True)
         ),
     )
-    extend, retract = list_log(path).proposals
-    assert extend.options == {
+    (both,) = list_log(path).proposals
+    assert both.options == {
         "rate": "99.75",
-        "position": "Extend Z(nm):nm",
-        "force": "Extend T-B(V):N",
+        "position": "Z(nm):nm",
+        "force": "T-B(V):N",
         "robot_stiffness": "0.5",
     }
-    assert retract.options["force"] == "Retract T-B(V):N"
     record = read_log(path, rate=99.75, position="Extend Z(nm):nm", force="Extend T-B(V)")
     assert record["force"].max() == pytest.approx(1.0 / 2e6 * 0.5)  # 1 V, 2 V/um, 0.5 N/m
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_two_branches_are_one_press_with_its_adhesion(tmp_path, capsys, turned):
+    """The second branch may be listed in the order of time, or of the place as the first."""
+    z = np.linspace(0, 2000, 500)
+    noise = 0.3 * np.random.default_rng(0).standard_normal((2, 500))
+    pressed_in, leaves = (np.where(z > touch, 4 * (z - 1200), 0) for touch in (1200, 1150))
+    way = slice(None, None, 1 if turned else -1)
+    columns = np.column_stack([z, pressed_in + noise[0], z[way], (leaves + noise[1])[way]])
+    path = tmp_path / "curve.csv"
+    names = "Approach Z (nm),Approach Force (nN),Retract Z (nm),Retract Force (nN)"
+    np.savetxt(path, columns, "%.4f", ",", header=names, comments="")
+    options = ["--rate", "500", "--position", "Z (nm)", "--force", "Force (nN)"]
+    assert main(["identify", str(path), *options, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    low, high = answer["working_point"]["stiffness"]["ci95"]
+    assert low < 4.0 < high
+    assert answer["press"]["pull_off_N"] == pytest.approx(200e-9, rel=0.2)
 
 
 def test_a_command_that_identify_refuses_is_not_printed(tmp_path, capsys):

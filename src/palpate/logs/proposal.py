@@ -391,10 +391,14 @@ def _timing(
     if clock is None and table.rate is not None:
         return {}, None
     if clock is None:
-        places = [column for column in columns if column.named.kind == "position" and column.step]
-        if table.speed and places:
-            length = unit(places[0].unit or unit_in_name(places[0].name, "length") or "m").factor
-            return {"rate": f"{table.speed / (abs(places[0].step) * length):.4g}"}, None
+        place = next(
+            (column for column in columns if column.named.kind == "position" and column.changes), None
+        )
+        if table.speed and place:
+            length = unit(place.unit or unit_in_name(place.name, "length") or "m").factor
+            step = float(np.median(np.abs(np.diff(place.finite)))) * length
+            if step > 0:
+                return {"rate": f"{table.speed / step:.4g}"}, None
         named = [column.name for column in columns if column.named.kind == "time"]
         none = f"{named[0]!r} is no time that is read, and " if named else ""
         guesses.append(f"{none}the log does not state its rate: --rate {_EXAMPLE_RATE} is only an example")

@@ -135,7 +135,12 @@ class Signals:
         options: dict[str, Any] = dict(proposal.options)
         if "preset" in options:
             options = _with_underscores(preset(options.pop("preset"))) | options
-        fields = {name: value for name, value in options.items() if name in Signals.__dataclass_fields__}
+        makers: dict[str, Callable[[str], Any]] = {"rate": float, "join": Path}
+        fields = {
+            name: makers.get(name, str)(value)
+            for name, value in options.items()
+            if name in Signals.__dataclass_fields__
+        }
         remaining = {name: value for name, value in options.items() if name not in fields}
         if guesses:
             remaining["guessed"] = {"command": proposal.command(path), "guesses": guesses}

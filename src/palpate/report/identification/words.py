@@ -190,6 +190,10 @@ def press_facts(result: Identification) -> list[str]:
     facts = [f"Slope by force: {', '.join(slopes)}."] if slopes else []
     if press.hysteresis_loss is not None:
         facts.append(f"{work_loss(press.hysteresis_loss)}.")
+    if press.pull_off is not None:
+        facts.append(
+            f"The surface holds the leaving probe with up to {quantity(press.pull_off, force)} (adhesion)."
+        )
     if press.relaxation is not None:
         relaxation = press.relaxation
         relaxed = f"{100 * relaxation.share:.2g} % of the force relaxes"
