@@ -473,6 +473,30 @@ def test_branches_in_volts_take_gain_rate_and_cantilever_of_the_header(tmp_path)
     assert record["force"].max() == pytest.approx(1.0 / 2e6 * 0.5)  # 1 V, 2 V/um, 0.5 N/m
 
 
+def test_of_many_logs_side_by_side_the_first_and_their_number_are_listed(tmp_path, capsys):
+    t = np.arange(300) / 100
+    z = 2 * np.maximum(np.sin(2 * t), -0.5)
+    noise = np.random.default_rng(0)
+    names, columns = ["time (s)"], [t]
+    for i in range(1, 21):
+        names += [f"curve {i}.height (mm)", f"curve {i}.force (N)"]
+        columns += [z, i * np.maximum(z, 0) + 0.01 * noise.standard_normal(len(t))]
+    path = tmp_path / "map.csv"
+    np.savetxt(path, np.column_stack(columns), "%.4f", ",", header=",".join(names), comments="")
+    assert main(["topics", str(path)]) == 0
+    shown = capsys.readouterr().out
+    assert "one of 20 logs side by side" in shown
+    assert shown.count("palpate identify") == 1
+    assert "38 more" in shown
+    assert "curve 2" not in shown
+    assert main(["identify", str(path)]) == 2
+    assert "holds 20 logs side by side" in capsys.readouterr().err
+    third = ["--time", "time (s)", "--position", "curve 3.height (mm)", "--force", "curve 3.force (N)"]
+    assert main(["identify", str(path), *third, "--json"]) == 0
+    low, high = json.loads(capsys.readouterr().out)["working_point"]["stiffness"]["ci95"]
+    assert low < 3000 < high
+
+
 @pytest.mark.parametrize("turned", [False, True])
 def test_two_branches_are_one_press_with_its_adhesion(tmp_path, capsys, turned):
     """The second branch may be listed in the order of time, or of the place as the first."""

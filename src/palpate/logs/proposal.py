@@ -49,6 +49,8 @@ _EXAMPLE_RATE = 1000
 """Rate in the printed example [Hz]; no result depends on it."""
 
 
+MAX_LISTED = 8
+"""Logs side by side in one table that are proposed each; of more, the first one and their number."""
 PRESS = "identify it"
 WEIGH = "weigh the tool on the sensor"
 FRICTION = "identify the friction of the axis"
@@ -65,6 +67,7 @@ class Proposal:
         guesses: a sentence each.
         facts: what the log shows of itself, likewise.
         purpose: of the command, as words behind `to`.
+        beside: logs side by side in the table, of which it is one.
         fallback: a second proposal, for a log that the first is refused for, or of which it identifies nothing.
     """
 
@@ -73,6 +76,7 @@ class Proposal:
     facts: tuple[str, ...] = ()
     purpose: str = PRESS
     fallback: "Proposal | None" = None
+    beside: int = 1
 
     @property
     def verb(self) -> str:
@@ -120,9 +124,15 @@ def from_columns(
     if all(f"{part}[{i}]" in members for part in ("q", "tau_ext_hat_filtered") for i in range(7)):
         return (Proposal(None, (_JOINTS_ONLY,)),)
     groups = side_by_side(rows)
+    several = len(groups) > MAX_LISTED
+    beside = f"one of {len(groups)} logs side by side"
     proposals = [
-        replace(proposal, facts=(f"{label!r}, one of {len(groups)} logs side by side", *proposal.facts))
-        for label, group in groups.items()
+        replace(
+            proposal,
+            facts=(f"{label!r}, {beside}{', which differ by that word' if several else ''}", *proposal.facts),
+            beside=len(groups),
+        )
+        for label, group in islice(groups.items(), 1 if several else None)
         if (proposal := _one_log(table, group, given)).options is not None
     ]
     return tuple(proposals) or (_one_log(table, rows, given),)

@@ -118,7 +118,7 @@ class Signals:
         from palpate.logs.listing import list_log
 
         listing = list_log(path, self.delimiter, self.limits, self.join)
-        if len(listing.proposals) > 1:
+        if listing.proposal.beside > 1:
             raise InputError(_list_several(path, listing.proposals))
         proposal = listing.proposal if choose is None else choose(path, listing.proposal)
         guesses = [
@@ -314,4 +314,4 @@ def _list_guesses(path: Path, proposal: "Proposal") -> str:
 def _list_several(path: Path, proposals: "Sequence[Proposal]") -> str:
     """The commands for the logs that a table holds side by side."""
     commands = "; or: ".join(str(proposal.command(path)) for proposal in proposals)
-    return f"{path} holds {len(proposals)} logs side by side; identify one: {commands}"
+    return f"{path} holds {proposals[0].beside} logs side by side; identify one: {commands}"
