@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from palpate.contact_frame.arm import ArmDynamics, robot_stiffness
 from palpate.contact_frame.payload import Payload, load_payload
@@ -15,12 +15,14 @@ from palpate.identification.indenter import Indenter, with_modulus
 from palpate.identification.options import OPTION_NAMES
 from palpate.logs.formats import log_of
 from palpate.logs.presets import preset
-from palpate.logs.proposal import FRICTION, PRESS, SLIDE, WEIGH, Proposal
 from palpate.logs.read import is_run, measured_by, read_log
 from palpate.logs.roles import quantity
 from palpate.logs.signals import Signals, read_as
 from palpate.records import Record
 from palpate.units import split_spec, unit_in_name
+
+if TYPE_CHECKING:
+    from palpate.logs.proposal import Proposal
 
 _SIDES = {None: None, "action": 1, "reaction": -1}
 
@@ -111,18 +113,20 @@ _MAX_TRIED_BYTES = 200e6
 """Largest log that a proposed command is tried on: a bag of gigabytes is listed at once."""
 
 
-def try_proposal(log: Path, proposal: Proposal) -> Proposal:
+def try_proposal(log: Path, proposal: "Proposal") -> "Proposal":
     """A proposal whose command answers, or else its fallback; the reason in place of a command that is refused."""
     return _tried(log, proposal)[0]
 
 
-def choose_proposal(log: Path, proposal: Proposal) -> Proposal:
+def choose_proposal(log: Path, proposal: "Proposal") -> "Proposal":
     """The proposal that is to be run: with a fallback, the first of both that answers."""
     return proposal if proposal.fallback is None else try_proposal(log, proposal)
 
 
-def _tried(log: Path, proposal: Proposal) -> tuple[Proposal, bool]:
+def _tried(log: Path, proposal: "Proposal") -> "tuple[Proposal, bool]":
     """A proposal or its fallback, tried; and True if its command answers."""
+    from palpate.logs.proposal import PRESS, SLIDE
+
     fallback = proposal.fallback
     if not proposal.options or (log.is_file() and log.stat().st_size > _MAX_TRIED_BYTES):
         return proposal, False
@@ -144,12 +148,14 @@ def _tried(log: Path, proposal: Proposal) -> tuple[Proposal, bool]:
     )
 
 
-def _try(log: Path, proposal: Proposal) -> tuple[Proposal, bool]:
+def _try(log: Path, proposal: "Proposal") -> "tuple[Proposal, bool]":
     """A proposal with what its answer shows, and True if its command answers.
 
     Raises:
         InputError: the command refuses the log.
     """
+    from palpate.logs.proposal import FRICTION, PRESS, SLIDE, WEIGH
+
     options: dict[str, Any] = dict(proposal.options or {})
     if "rate" in options:
         options["rate"] = float(options["rate"])

@@ -323,14 +323,14 @@ def _above_baseline(
         if baseline.depth >= indenter.size:
             return modulus
         parts["small strain"] = abs(_hertz_ratio(baseline.depth / indenter.size) - 1) * reduced
-    found = _judge_modulus(reduced, parts, indenter, poisson, baseline.depth, tolerance)
+    judged = _judge_modulus(reduced, parts, indenter, poisson, baseline.depth, tolerance)
     place, force, slope = (
         quantity(*number[:1], symbol, number[1])
         for number, symbol in ((baseline.contact, "m"), (baseline.force, "N"), (baseline.slope, "N/m"))
     )
-    known, colon, terms = found.reason.partition(": ")
+    known, colon, terms = judged.reason.partition(": ")
     line = f"above a baseline of {force} with a slope of {slope}, contact at {place}"
-    return replace(found, reason=f"{known}, {line}{colon}{terms}")
+    return replace(judged, reason=f"{known}, {line}{colon}{terms}")
 
 
 def _hertz_ratio(strain: float) -> float:

@@ -151,8 +151,8 @@ def _pull_off(channels: Channels, contacts: Contacts) -> float | None:
     noise = robust_std(force[outside]) if outside.any() else 0.0
     least = max(_MIN_PULL_STDS * noise, _MIN_PULL_FRACTION * float(force.max()))
     pulls = np.sort(-force[behind & channels.valid])[::-1]
-    held = len(pulls) > _MIN_PULL_ROWS and pulls[_MIN_PULL_ROWS - 1] > least
-    return float(pulls[0]) if held else None
+    sticks = len(pulls) > _MIN_PULL_ROWS and pulls[_MIN_PULL_ROWS - 1] > least
+    return float(pulls[0]) if sticks else None
 
 
 def _surface_alone(choice: Choice, options: Options) -> Choice:

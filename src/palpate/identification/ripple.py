@@ -55,7 +55,7 @@ class Ripple:
 
     @property
     def amplitude(self) -> float:
-        """Amplitude [N]."""
+        """Amplitude of the sine [N]."""
         return float(np.hypot(*self.parts))
 
     @property
@@ -216,8 +216,8 @@ def _strongest(along: Array, force: Array) -> float | None:
         return None
     place = np.minimum(((along - low) / reach * count).astype(np.intp), count - 1)
     sums, numbers = np.bincount(place, force, count), np.bincount(place, minlength=count)
-    seen = np.flatnonzero(numbers)
-    values = detrend(np.interp(np.arange(count), seen, sums[seen] / numbers[seen]))
+    filled = np.flatnonzero(numbers)
+    values = detrend(np.interp(np.arange(count), filled, sums[filled] / numbers[filled]))
     power = np.abs(np.fft.rfft(values * np.hanning(count), 8 * count)) ** 2
     first = int(8 * MIN_PERIODS)
     return 2 * np.pi * (first + int(np.argmax(power[first:]))) / 8 / reach

@@ -136,9 +136,11 @@ def join_branches(sheet: Sheet) -> Sheet:
     place = next(pair for pair in joined if pair[0].named.kind == "position")
 
     def read(places: Sequence[int], missing: Sequence[str]) -> tuple[list[Cells], list[dict[str, Any]]]:
-        own = [i for i in places if i < len(sheet.names)]
+        plain = [i for i in places if i < len(sheet.names)]
         further = [joined[i - len(sheet.names)] for i in places if i >= len(sheet.names)]
-        needed = list(dict.fromkeys([*own, *(column.place for pair in [*further, place] for column in pair)]))
+        needed = list(
+            dict.fromkeys([*plain, *(column.place for pair in [*further, place] for column in pair)])
+        )
         cells, notes = sheet.read(needed, missing)
         by_place = dict(zip(needed, cells, strict=True))
         shared = [by_place[column.place].numbers for column in place]

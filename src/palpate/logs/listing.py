@@ -112,8 +112,8 @@ def list_log(
         named = shorten(", ".join(sheet.name for sheet in repeats), 120)
         proposals = (replace(first, guesses=(*first.guesses, text + named)),)
     if proposals[0].beside > MAX_LISTED:
-        named = {word.rpartition(":")[0] or word for word in proposals[0].words or ()}
-        shown = [c for c in columns if not {c.name, str(c.place)}.isdisjoint(named)]
+        used = {word.rpartition(":")[0] or word for word in proposals[0].words or ()}
+        shown = [c for c in columns if not {c.name, str(c.place)}.isdisjoint(used)]
         entries = [_of_column(column, clock) for column in shown]
         entries.append(SignalEntry(f"{len(columns) - len(shown)} more", "-", 0, None, None, None, "likewise"))
     facts = [f"{table.rate:g} rows a second, as the file states"] if table.rate else []
