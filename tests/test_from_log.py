@@ -156,7 +156,7 @@ TIME = np.arange(2000) / 500
 MOVED = 1e-3 * np.sin(2 * TIME)
 
 
-def test_what_would_be_guessed_is_refused_with_the_command_to_try(tmp_path, capsys):
+def test_a_guess_is_refused_in_python_and_named_first_by_the_command(tmp_path, capsys):
     noise = np.random.default_rng(0).normal(
         scale=0.05, size=len(MOVED)
     )  # an exact line is one quantity twice
@@ -169,8 +169,17 @@ def test_what_would_be_guessed_is_refused_with_the_command_to_try(tmp_path, caps
     )
     with pytest.raises(InputError, match="no unit is given for 'x'"):
         palpate.read_log(path)
-    assert main(["identify", str(path)]) == 2
-    assert command in capsys.readouterr().err
+    assert main(["identify", str(path), "--figure", str(tmp_path / "a.png")]) == 1
+    first, *others = capsys.readouterr().out.splitlines()
+    assert first.startswith("! no unit is given for 'x'")
+    assert first.endswith(f"If that is right: {command}")
+    assert "? in doubt" in " ".join(others)
+    assert main(["identify", str(path), "--json"]) == 1
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["guessed"]["command"] == command
+    assert answer["parameters"]["K"]["verdict"] == "not identifiable"
+    assert main([*command.split()[1:], "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["guessed"] is None
 
 
 @pytest.mark.parametrize(

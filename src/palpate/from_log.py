@@ -3,23 +3,26 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from palpate.contact_frame.arm import ArmDynamics, robot_stiffness
 from palpate.contact_frame.payload import Payload, load_payload
 from palpate.contact_frame.press_or_slide import identify_contact
 from palpate.contact_frame.signals_in_base import ContactFrame
 from palpate.errors import InputError, unknown
-from palpate.identification import Code, Identification
+from palpate.identification import Code, Identification, Warn
 from palpate.identification.indenter import Indenter, with_modulus
 from palpate.identification.options import OPTION_NAMES
 from palpate.logs.formats import log_of
 from palpate.logs.presets import preset
-from palpate.logs.read import is_run, measured_by
+from palpate.logs.read import is_run, measured_by, read_log
 from palpate.logs.roles import quantity
 from palpate.logs.signals import Signals, read_as
 from palpate.records import Record
 from palpate.units import split_spec, unit_in_name
+
+if TYPE_CHECKING:
+    from palpate.logs.proposal import Proposal
 
 _SIDES = {None: None, "action": 1, "reaction": -1}
 
@@ -37,6 +40,7 @@ class LogIdentifier:
         indenter: shape of the probe, for Young's modulus.
         poisson: Poisson's ratio with its standard deviation; None for 0 to 0.5.
         options: of `palpate.identify`.
+        guess: use columns, units and axes that are guessed, and say so in a warning, in place of refusing the log.
     """
 
     signals: Signals = field(default_factory=Signals)
@@ -47,6 +51,7 @@ class LogIdentifier:
     indenter: Indenter | None = None
     poisson: tuple[float, float] | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
+    guess: bool = False
 
     def identify(self, log: Path) -> tuple[Identification, Record]:
         """Read and identify a log.
@@ -57,11 +62,11 @@ class LogIdentifier:
         Raises:
             InputError: the log or an option is wrong, in one line.
         """
-        job, words = self._complete(log)
+        job, words, guessed = self._complete(log)
         options: dict[str, Any] = measured_by(log) if job.signals.plain and is_run(log) else {}
         options |= self.options
         samples = str(options.get("force_filter") or "none") != "none"
-        record = read_as(job.signals.read(log, samples=samples), words)
+        record = read_as(job.signals.read(log, samples=samples), words, guessed)
         in_space = "force_x" in record.columns
         if not in_space:
             if replace(self.frame, force_sign=None) != ContactFrame():
@@ -71,14 +76,25 @@ class LogIdentifier:
             options["force_sign"] = _SIDES[self.frame.force_sign]
         frame = replace(job.frame, payload=self.payload) if in_space else None
         result, along = identify_contact(record, frame, _between(job, options, samples), **options)
-        result = accept_stated_units(result, record, _specs(job.signals))
+        if not any("is a guess" in guess for guess in (guessed or {}).get("guesses", ())):
+            result = accept_stated_units(result, record, _specs(job.signals))
+        if guessed is not None:
+            text = f"{'; '.join(guessed['guesses'])}. If that is right: {guessed['command']}"
+            result = replace(result, warnings=(Warn(Code.SIGNALS_GUESSED, text), *result.warnings))
         if self.indenter is not None:
-            result = with_modulus(result, self.indenter, self.poisson, options.get("tolerance", 0.25))
+            result = with_modulus(result, self.indenter, self.poisson, options.get("tolerance", 0.25), along)
         return result, along
 
-    def _complete(self, log: Path) -> "tuple[LogIdentifier, str]":
-        """These with what the log's own names leave no doubt of; what is given goes first."""
-        signals, remaining = self.signals.complete(log, known_frame=self.frame.wrench_frame is not None)
+    def _complete(self, log: Path) -> "tuple[LogIdentifier, str, Mapping[str, Any] | None]":
+        """These with what the log's own names leave no doubt of, the words for it, and the guesses, if any is allowed.
+
+        What is given goes first.
+        """
+        signals, remaining = self.signals.complete(
+            log,
+            known_frame=self.frame.wrench_frame is not None,
+            choose=choose_proposal if self.guess else None,
+        )
         frame = self.frame
         arm = self.arm
         if frame.wrench_frame is None and "wrench_frame" in remaining:
@@ -87,7 +103,85 @@ class LogIdentifier:
             frame = replace(frame, gravity_compensated=True)
         if arm.position_from is None and "position_from" in remaining:
             arm = replace(arm, position_from=remaining["position_from"])
-        return replace(self, signals=signals, frame=frame, arm=arm), remaining.get("read_as", "")
+        if arm.stiffness is None and "robot_stiffness" in remaining:
+            arm = replace(arm, stiffness=(float(remaining["robot_stiffness"]), 0.0))
+        job = replace(self, signals=signals, frame=frame, arm=arm)
+        return job, remaining.get("read_as", ""), remaining.get("guessed")
+
+
+_MAX_TRIED_BYTES = 200e6
+"""Largest log that a proposed command is tried on: a bag of gigabytes is listed at once."""
+
+
+def try_proposal(log: Path, proposal: "Proposal") -> "Proposal":
+    """A proposal whose command answers, or else its fallback; the reason in place of a command that is refused."""
+    return _tried(log, proposal)[0]
+
+
+def choose_proposal(log: Path, proposal: "Proposal") -> "Proposal":
+    """The proposal that is to be run: with a fallback, the first of both that answers."""
+    return proposal if proposal.fallback is None else try_proposal(log, proposal)
+
+
+def _tried(log: Path, proposal: "Proposal") -> "tuple[Proposal, bool]":
+    """A proposal or its fallback, tried; and True if its command answers."""
+    from palpate.logs.proposal import PRESS, SLIDE
+
+    fallback = proposal.fallback
+    if not proposal.options or (log.is_file() and log.stat().st_size > _MAX_TRIED_BYTES):
+        return proposal, False
+    slide = fallback is not None and fallback.purpose == SLIDE
+    if fallback is not None and slide:  # one axis of a slide may look like a press
+        other, answers = _tried(log, replace(fallback, fallback=None))
+        if answers:
+            return other, True
+    try:
+        tried, answers = _try(log, proposal)
+    except (InputError, MemoryError) as error:
+        reason = f"{proposal.verb} refuses what the names suggest: {' '.join(str(error).split())}"
+        tried, answers = replace(proposal, options=None, guesses=(reason,), facts=()), False
+    if answers or fallback is None:
+        return tried, answers
+    other, answers = _tried(log, fallback.fallback or fallback if slide else fallback)
+    return (
+        (other, answers) if answers or proposal.purpose != PRESS or tried.options is None else (tried, False)
+    )
+
+
+def _try(log: Path, proposal: "Proposal") -> "tuple[Proposal, bool]":
+    """A proposal with what its answer shows, and True if its command answers.
+
+    Raises:
+        InputError: the command refuses the log.
+    """
+    from palpate.logs.proposal import FRICTION, PRESS, SLIDE, WEIGH
+
+    options: dict[str, Any] = dict(proposal.options or {})
+    if "rate" in options:
+        options["rate"] = float(options["rate"])
+    if "robot_stiffness" in options:
+        options["robot_stiffness"] = (float(options["robot_stiffness"]), 0.0)
+    if "join" in options:
+        options["join"] = Path(options["join"])
+    if proposal.purpose == WEIGH:
+        from palpate.contact_frame.tool_payload import weigh
+
+        frame = ContactFrame(wrench_frame=options.pop("wrench_frame"))
+        return proposal, weigh(Signals(**options).read(log), frame, _TOLERANCE).payload is not None
+    if proposal.purpose == FRICTION:
+        from palpate.contact_frame.axis_friction import identify_friction
+
+        del options["friction"]
+        options["force"] = options.pop("force_column")
+        return proposal, identify_friction(read_log(log, **options)).identified
+    result, _ = log_identifier(options).identify(log)
+    if result.slide is not None:
+        return replace(proposal, purpose=SLIDE), True
+    return proposal, result.identified and proposal.purpose == PRESS
+
+
+_TOLERANCE = 0.25
+"""Relative half-width up to which a mass counts as identified: the default of `palpate payload`."""
 
 
 def accept_stated_units(

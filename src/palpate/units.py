@@ -131,6 +131,7 @@ def split_spec(spec: str) -> tuple[str, str | None]:
 def unit_in_name(name: str, quantity: str) -> str | None:
     """The unit that a column's name carries, such as `mm` in `position_mm` or `pos [mm]`, if it fits the quantity."""
     name = re.sub(r"([\])])\.\d+$", r"\1", name)  # pandas numbers repeated names
+    name = re.sub(r"_(mm?|rad|deg)_s$", r"_\1/s", name)
     tail = name.rstrip(" ])").replace("[", "_").replace("(", "_").rsplit("_", 1)
     if len(tail) < 2:
         return None

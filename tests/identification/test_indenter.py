@@ -118,6 +118,35 @@ def test_a_press_of_a_simulated_surface(shape):
     assert own.ci95[0] < MODULUS < own.ci95[1]
 
 
+@pytest.mark.parametrize(("offset", "slope"), [(-2.0, 0.0), (0.5, 0.02), (0.0, 0.1), (0.0, -0.1)])
+@pytest.mark.parametrize("shape", ["sphere", pytest.param("cone", marks=pytest.mark.long)])
+def test_a_baseline_before_the_contact_is_estimated(shape, offset, slope):
+    """An offset, and a slope per depth, of the peak force, under the approach and the retraction."""
+    indenter, law = SHAPES[shape]
+    held = 0
+    for seed in range(3):
+        time = np.arange(0, 12, 5e-3)
+        x = np.interp(time, [0, 1, 6, 6.5, 11.5, 12], 1e-3 * np.array([-1.5, -1.5, 1, 1, -1.5, -1.5]))
+        peak = law(1e-3)
+        noise = 2e-3 * np.random.default_rng(seed).standard_normal(len(time))
+        log = record(time, x, law(np.maximum(x, 0)) + peak * (offset + slope * (x + 1.5e-3) / 1e-3 + noise))
+        own = with_modulus(identify(log), indenter, (NU, 0.0), record=log).parameters["E"]
+        assert own.verdict is Verdict.IDENTIFIED
+        assert ("above a baseline" in own.reason) == (slope != 0)
+        held += own.ci95[0] < MODULUS < own.ci95[1]
+    assert held >= 2
+
+
+def test_a_baseline_does_not_excuse_another_indenter():
+    indenter, _ = SHAPES["sphere"]
+    x = np.linspace(-1.5e-3, 1e-3, 2000)
+    force = SHAPES["cone"][1](np.maximum(x, 0))
+    force += 1e-3 * force.max() * np.random.default_rng(0).standard_normal(len(x)) + 20 * x
+    log = record(np.arange(len(x)) / 200, x, force)
+    own = with_modulus(identify(log), indenter, (NU, 0.0), record=log).parameters["E"]
+    assert own.verdict is not Verdict.IDENTIFIED
+
+
 @pytest.mark.parametrize(
     ("shape", "size", "why"),
     [

@@ -180,7 +180,7 @@ def test_the_json_is_the_contract():
     assert point["source"] in {"octave", "press"}
     octaves = {"Hz", "storage", "storage_half", "loss", "loss_half", "blocks"}
     assert all(set(octave) == octaves for octave in said["dynamic_stiffness"])
-    assert set(said["press"]) == {"tangent", "hysteresis_loss", "relaxation"}
+    assert set(said["press"]) == {"tangent", "hysteresis_loss", "pull_off_N", "relaxation"}
     assert all(set(slope) == {"force_N", "stiffness", "half"} for slope in said["press"]["tangent"])
     assert all({"model", "r2", "note"} <= set(compared) for compared in said["models"])
     assert [compared["model"] for compared in said["models"] if compared["chosen"]] == [said["model"]]

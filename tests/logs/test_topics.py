@@ -363,6 +363,63 @@ def test_a_log_lacks_what_it_lacks_and_leads_to_what_it_is_good_for(tmp_path):
     assert "joints" in proposed(tmp_path, "time,q_0,q_1,tau_0,tau_1", t, x, 2 * x, 3 * x, x**2).guesses[0]
 
 
+def sliding(axes):
+    """Columns of a tip that touches at -z, presses with 2 to 10 N and slides with mu 0.3 along x."""
+    t = np.arange(0, 12, 4e-3)
+    rng = np.random.default_rng(0)
+    x = 0.02 * np.where(t > 3, np.sin(1.6 * (t - 3)), 0)
+    z = np.interp(t, [0, 1, 2, 8, 11, 12], [5e-3, 5e-3, -1e-3, -2e-3, -4e-4, -4e-4])
+    load = 5e3 * np.maximum(-z, 0)
+    ahead = np.gradient(x, t)
+    force = {"x": 0.3 * load * np.clip(ahead / 2e-3, -1, 1), "y": 0 * t, "z": -load}
+    place = {"x": x, "y": 1e-3 * x, "z": z}
+    return [
+        t,
+        *(force[a] + 0.02 * rng.standard_normal(len(t)) for a in axes),
+        *(1e3 * place[a] for a in axes),
+    ]
+
+
+@pytest.mark.parametrize("axes", ["xyz", "xz"])
+def test_a_slide_is_proposed_and_identified_as_one(tmp_path, capsys, axes):
+    path = tmp_path / "slide.csv"
+    names = ["time_s", *(f"f{a}_N" for a in axes), *(f"{a}_mm" for a in axes)]
+    np.savetxt(path, np.column_stack(sliding(axes)), "%.6f", ",", header=",".join(names), comments="")
+    assert main(["topics", str(path)]) == 0
+    shown = capsys.readouterr().out
+    assert "to identify the friction of the slide in it" in shown
+    assert ("fx_N:N,-,fz_N:N" in shown) == (axes == "xz")
+    assert main(["identify", str(path), "--json"]) == 1
+    answer = json.loads(capsys.readouterr().out)
+    assert "--wrench-frame base" in answer["guessed"]["command"]
+    low, high = answer["slide"]["friction"]["ci95"]
+    assert low < 0.3 < high
+    assert high - low < 0.05
+
+
+@pytest.mark.parametrize(
+    ("names", "motion"), [("t,qd,tau", "--velocity qd:rad/s"), ("t,q_rad,tau", "--position q_rad:rad")]
+)
+def test_a_force_against_the_motion_is_led_to_friction(tmp_path, capsys, names, motion):
+    t = np.arange(0, 20, 4e-3)
+    speed = 0.5 * np.sin(2.5 * t) + 0.2 * np.sin(0.9 * t)
+    torque = 2 * np.sign(speed) + 3 * speed + 0.05 * np.random.default_rng(0).standard_normal(len(t))
+    path = tmp_path / "joint.csv"
+    moved = speed if "qd" in names else 4e-3 * np.cumsum(speed)
+    np.savetxt(path, np.column_stack([t, moved, torque]), "%.6f", ",", header=names, comments="")
+    command = f"palpate identify {path} --time t {motion} --force-column tau:Nm --friction"
+    assert main(["topics", str(path)]) == 0
+    assert (
+        f"to identify the friction of the axis (guessed parts are listed below):\n  {command}"
+        in capsys.readouterr().out
+    )
+    assert main(["identify", str(path)]) == 2
+    assert command in capsys.readouterr().err
+    assert main([*command.split()[1:], "--json"]) == 0
+    low, high = json.loads(capsys.readouterr().out)["parameters"]["Fc"]["ci95"]
+    assert low < 2 < high
+
+
 @pytest.mark.parametrize(
     ("names", "pairs"),
     [
@@ -372,11 +429,8 @@ def test_a_log_lacks_what_it_lacks_and_leads_to_what_it_is_good_for(tmp_path):
             [("Displacement (mm):mm", "Load (N):N"), ("Displacement (mm).1:mm", "Load (N).1:N")],
         ),
         (
-            "approach time (s),approach z (mm),approach force (N),retract time (s),retract z (mm),retract force (N)",
-            [
-                ("approach z (mm):mm", "approach force (N):N"),
-                ("retract z (mm):mm", "retract force (N):N"),
-            ],
+            "first time (s),first z (mm),first force (N),second time (s),second z (mm),second force (N)",
+            [("first z (mm):mm", "first force (N):N"), ("second z (mm):mm", "second force (N):N")],
         ),
     ],
 )
@@ -408,16 +462,58 @@ def test_branches_in_volts_take_gain_rate_and_cantilever_of_the_header(tmp_path)
             f"{a:.4f},{b:.6f},{1000 - a:.4f},{c:.6f}\n" for a, b, c in zip(z, volts, volts[::-1], strict=True)
         ),
     )
-    extend, retract = list_log(path).proposals
-    assert extend.options == {
+    (both,) = list_log(path).proposals
+    assert both.options == {
         "rate": "99.75",
-        "position": "Extend Z(nm):nm",
-        "force": "Extend T-B(V):N",
+        "position": "Z(nm):nm",
+        "force": "T-B(V):N",
         "robot_stiffness": "0.5",
     }
-    assert retract.options["force"] == "Retract T-B(V):N"
     record = read_log(path, rate=99.75, position="Extend Z(nm):nm", force="Extend T-B(V)")
     assert record["force"].max() == pytest.approx(1.0 / 2e6 * 0.5)  # 1 V, 2 V/um, 0.5 N/m
+
+
+def test_of_many_logs_side_by_side_the_first_and_their_number_are_listed(tmp_path, capsys):
+    t = np.arange(300) / 100
+    z = 2 * np.maximum(np.sin(2 * t), -0.5)
+    noise = np.random.default_rng(0)
+    names, columns = ["time (s)"], [t]
+    for i in range(1, 21):
+        names += [f"curve {i}.height (mm)", f"curve {i}.force (N)"]
+        columns += [z, i * np.maximum(z, 0) + 0.01 * noise.standard_normal(len(t))]
+    path = tmp_path / "map.csv"
+    np.savetxt(path, np.column_stack(columns), "%.4f", ",", header=",".join(names), comments="")
+    assert main(["topics", str(path)]) == 0
+    shown = capsys.readouterr().out
+    assert "one of 20 logs side by side" in shown
+    assert shown.count("palpate identify") == 1
+    assert "38 more" in shown
+    assert "curve 2" not in shown
+    assert main(["identify", str(path)]) == 2
+    assert "holds 20 logs side by side" in capsys.readouterr().err
+    third = ["--time", "time (s)", "--position", "curve 3.height (mm)", "--force", "curve 3.force (N)"]
+    assert main(["identify", str(path), *third, "--json"]) == 0
+    low, high = json.loads(capsys.readouterr().out)["working_point"]["stiffness"]["ci95"]
+    assert low < 3000 < high
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_two_branches_are_one_press_with_its_adhesion(tmp_path, capsys, turned):
+    """The second branch may be listed in the order of time, or of the place as the first."""
+    z = np.linspace(0, 2000, 500)
+    noise = 0.3 * np.random.default_rng(0).standard_normal((2, 500))
+    pressed_in, leaves = (np.where(z > touch, 4 * (z - 1200), 0) for touch in (1200, 1150))
+    way = slice(None, None, 1 if turned else -1)
+    columns = np.column_stack([z, pressed_in + noise[0], z[way], (leaves + noise[1])[way]])
+    path = tmp_path / "curve.csv"
+    names = "Approach Z (nm),Approach Force (nN),Retract Z (nm),Retract Force (nN)"
+    np.savetxt(path, columns, "%.4f", ",", header=names, comments="")
+    options = ["--rate", "500", "--position", "Z (nm)", "--force", "Force (nN)"]
+    assert main(["identify", str(path), *options, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    low, high = answer["working_point"]["stiffness"]["ci95"]
+    assert low < 4.0 < high
+    assert answer["press"]["pull_off_N"] == pytest.approx(200e-9, rel=0.2)
 
 
 def test_a_command_that_identify_refuses_is_not_printed(tmp_path, capsys):

@@ -54,8 +54,9 @@ class OneLog:
         from palpate.contact_frame.arm import describe
         from palpate.report.identification.words import file_digest
 
-        result, along = self.identifier.identify(log)
-        return result, self.log_source(log, sha256=file_digest(log), notes=tuple(describe(along.meta)))
+        result, along = replace(self.identifier, guess=True).identify(log)
+        known = {"notes": tuple(describe(along.meta)), "guessed": along.meta.get("guessed")}
+        return result, self.log_source(log, sha256=file_digest(log), **known)
 
     def log_source(self, log: Path, **known: Any) -> Source:
         """Source of an identification: a log, these options, this command, now."""

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
 from palpate.cli._program import print_result
 from palpate.cli._terminal import print_lines
 from palpate.cli.options.common import WRITTEN
-from palpate.errors import InputError
 from palpate.logs.signals import GB, Signals
 
 if TYPE_CHECKING:
@@ -22,8 +20,6 @@ if TYPE_CHECKING:
 
 
 _HOW = Group("Reading", sort_key=1)
-_MAX_TRIED_BYTES = 200e6
-"""Largest log that a proposed command is tried on: a bag of gigabytes is listed at once."""
 
 
 def topics(
@@ -56,11 +52,12 @@ def topics(
     json
         Print one JSON object and nothing else.
     """
+    from palpate.from_log import try_proposal
     from palpate.logs.listing import list_log
     from palpate.report.page import Answer
 
     listing = list_log(log, delimiter, Signals(max_size=max_size, max_seconds=max_seconds).limits, join)
-    proposals = [_tried(log, proposal) for proposal in listing.proposals]
+    proposals = [try_proposal(log, proposal) for proposal in listing.proposals]
     plain_proposals = [
         {"command": proposal.command(log), "guesses": list(proposal.guesses)} for proposal in proposals
     ]
@@ -77,56 +74,6 @@ def topics(
         lines += _proposal_lines(proposal, proposal.command(log))
     print_result(Answer(plain, show=lambda _: print_lines(*lines)), json=json)
     return 0
-
-
-def _tried(log: Path, proposal: Proposal) -> Proposal:
-    """A proposal whose command answers; if the log is refused its fallback, or the reason why there is none."""
-    if not proposal.options or (log.is_file() and log.stat().st_size > _MAX_TRIED_BYTES):
-        return proposal
-    try:
-        answers = _weighs(log, proposal) if proposal.verb == "payload" else _identifies(log, proposal)
-    except (InputError, MemoryError) as error:
-        reason = " ".join(str(error).split())
-        refused = f"{proposal.verb} refuses what the names suggest: {reason}"
-    else:
-        if answers or proposal.fallback is None:
-            return proposal
-        refused = ""
-    if proposal.fallback is not None:
-        return _tried(log, proposal.fallback)
-    return replace(proposal, options=None, guesses=(refused,), facts=())
-
-
-def _identifies(log: Path, proposal: Proposal) -> bool:
-    """True if `palpate identify` reads a log as proposed; what it identifies is its own answer."""
-    from palpate.from_log import log_identifier
-
-    options: dict[str, Any] = dict(proposal.options or {})
-    if "rate" in options:
-        options["rate"] = float(options["rate"])
-    if "robot_stiffness" in options:
-        options["robot_stiffness"] = (float(options["robot_stiffness"]), 0.0)
-    if "join" in options:
-        options["join"] = Path(options["join"])
-    log_identifier(options).identify(log)
-    return True
-
-
-def _weighs(log: Path, proposal: Proposal) -> bool:
-    """True if `palpate payload` gives the mass of a tool from a log as proposed."""
-    from palpate.contact_frame.signals_in_base import ContactFrame
-    from palpate.contact_frame.tool_payload import weigh
-
-    options: dict[str, Any] = dict(proposal.options or {})
-    frame = ContactFrame(wrench_frame=options.pop("wrench_frame"))
-    options |= {
-        name: make(options[name]) for name, make in (("rate", float), ("join", Path)) if name in options
-    }
-    return weigh(Signals(**options).read(log), frame, _TOLERANCE).payload is not None
-
-
-_TOLERANCE = 0.25
-"""Relative half-width up to which a mass counts as identified: the default of `palpate payload`."""
 
 
 def _table(log: Path, listing: Listing) -> list[str]:
@@ -155,10 +102,9 @@ def _proposal_lines(proposal: Proposal, command: str | None) -> list[str]:
     guesses = [f"  {guess}" for guess in proposal.guesses]
     if command is None:
         return ["", "no command is proposed:", *guesses]
-    purpose = "to identify it" if proposal.verb == "identify" else "to weigh the tool on the sensor"
     return [
         "",
-        f"{purpose}:" if not guesses else f"{purpose} (guessed parts are listed below):",
+        f"to {proposal.purpose}{' (guessed parts are listed below)' if guesses else ''}:",
         f"  {command}",
         *(f"  {fact}" for fact in proposal.facts),
         *guesses,

@@ -31,6 +31,7 @@ _CAUSES = {
     ),
     "loadings": Cause("differences between loadings", "press more often, at one speed", "A"),
     "friction": Cause("friction, or play before the position's sensor", "press and measure without play"),
+    "ripple": Cause("the ripple of the force", "remove its cause: mains, vibration, interference"),
     "touch": Cause("the difference between touch and contact", "approach more slowly, and more often"),
     "octaves": Cause("the difference between frequencies", "excite a wider band (palpate excite)", "A"),
     "blocks": Cause("differences between parts of the log", "press longer, or more often, at one depth", "A"),
@@ -116,12 +117,14 @@ class Code(Enum):
     IRREGULAR_TIME = "The rows are not evenly spaced in time; both channels are resampled evenly."
     SATURATED = "A channel rests at its extreme while the other moves on: it is at the end of its range."
     UNIT_GUESS = "A unit was guessed: neither you nor the file states it."
+    SIGNALS_GUESSED = "Columns, units or axes were guessed: neither you nor the file states them."
     UNIT_STATED = "A unit was taken from the file's own statement, or from a column's name."
     UNIT_DOUBTFUL = "A unit is probably wrong: the press is unusual by it, or the column's name has another."
     TIME_DOUBTFUL = "The time is doubtful in this unit: it counts rows, or its rate is beyond any log's."
     COLUMNS_SWAPPED = "A column was given a role that its own name contradicts."
     LINES_SKIPPED = "Lines of the file that are not rows of its table were left out."
     FORCE_DRIFTS = "The force in free motion changes during the log; the change is removed."
+    FORCE_RIPPLES = "The force in free motion ripples; the ripple is removed, and what may be left counts."
     FORCE_SIGN_REVERSED = "The force falls as the probe goes in; its sign was reversed."
     POSITION_SIGN_REVERSED = "The position falls as the probe goes in; its sign was reversed."
     LOW_RATE = "Rows are so rare that fast motion may be missed, and with it damping and mass."

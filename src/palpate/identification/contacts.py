@@ -17,6 +17,7 @@ from palpate.identification.free_motion import (
     find_moving_mass,
 )
 from palpate.identification.options import DEFAULT_OPTIONS, Options, lag_prior
+from palpate.identification.ripple import Ripple, find_ripple
 from palpate.identification.sampling import Channels, thinned
 from palpate.identification.steady_press import SteadyPress, steady_press
 from palpate.identification.strokes import Stroke, find_strokes
@@ -61,6 +62,7 @@ class Contacts:
         payload: mass whose inertia the force shows in free motion, after the signs; None if it shows none.
         drift: of the force, removed as straight lines; None if the log shows none.
         press: at constant speed, of a log that has little else; None for another log.
+        ripple: of the force, removed as a sine; None if free motion shows none.
     """
 
     spans: tuple[tuple[int, int], ...]
@@ -75,6 +77,7 @@ class Contacts:
     payload: MovingMass | None = None
     drift: Drift | None = None
     press: SteadyPress | None = None
+    ripple: Ripple | None = None
 
 
 def contacts_of(channels: Channels, options: Options = DEFAULT_OPTIONS) -> tuple[Channels, Chain, Contacts]:
@@ -93,6 +96,7 @@ def contacts_of(channels: Channels, options: Options = DEFAULT_OPTIONS) -> tuple
     drift = None
     press = None
     free_motion = None if options.bonded else _detect_free_motion(channels, chain, options.assumed_lag)
+    channels, free_motion, ripple = _without_ripple(channels, chain, free_motion, options)
     if free_motion is not None and strokes and not _has_free_approach(channels, free_motion, strokes):
         free_motion = None
     if free_motion is not None and free_motion.drifts:
@@ -112,7 +116,7 @@ def contacts_of(channels: Channels, options: Options = DEFAULT_OPTIONS) -> tuple
             contacts = _find_contacts(channels, chain, free_motion, options, strokes)
         else:
             contacts = candidate
-    contacts = replace(contacts, drift=drift, press=press)
+    contacts = replace(contacts, drift=drift, press=press, ripple=ripple)
     if not contacts.spans:
         return channels, chain, contacts
     begin, end = max(contacts.spans, key=lambda span: span[1] - span[0])
@@ -127,13 +131,39 @@ def contacts_of(channels: Channels, options: Options = DEFAULT_OPTIONS) -> tuple
     thinned_channels = thinned(channels, min(block, len(channels.force) // _MIN_ROWS))
     narrow = Chain(chosen, thinned_channels.dt)
     thinned_contacts = replace(
-        _find_contacts(thinned_channels, narrow, free_motion, options, strokes), drift=drift, press=press
+        _find_contacts(thinned_channels, narrow, free_motion, options, strokes),
+        drift=drift,
+        press=press,
+        ripple=ripple,
     )
     return (
         (thinned_channels, narrow, thinned_contacts)
         if thinned_contacts.spans
         else (channels, chain, contacts)
     )
+
+
+def _without_ripple(
+    channels: Channels, chain: Chain, free_motion: FreeMotion | None, options: Options
+) -> tuple[Channels, FreeMotion | None, Ripple | None]:
+    """Channels and free motion less a ripple, and the ripple; as they are without one, or if a mass explains the force.
+
+    A ripple hides where free motion ends: it is fitted again in the free motion that shows without it.
+    """
+    lag = options.assumed_lag
+    unchanged = channels, free_motion, None
+    if options.bonded or (free_motion and find_moving_mass(channels, chain, free_motion, lag) is not None):
+        return unchanged
+    shown = free_motion
+    for _ in range(2):
+        ripple = find_ripple(channels, shown)
+        if ripple is None:
+            return unchanged
+        without = ripple.subtract(channels)
+        shown = _detect_free_motion(without, chain, lag)
+        if shown is None:
+            return unchanged
+    return without, shown, ripple
 
 
 def _has_free_approach(channels: Channels, free_motion: FreeMotion, strokes: tuple[Stroke, ...]) -> bool:

@@ -23,10 +23,13 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
+from palpate.identification.least_squares import estimate_noise
 from palpate.identification.result import Identification, Press
 from palpate.identification.uncertainty import Contribution, Parameter, Verdict, half_width
+from palpate.records import Record
+from palpate.signals.samples import block_means, white_noise
 from palpate.signals.types import NORMAL
-from palpate.units import unit
+from palpate.units import quantity, unit
 
 ASSUMPTIONS = "a half space (deep and wide compared with the contact), small strain, no adhesion"
 """Assumptions of the laws, which no press can check."""
@@ -104,14 +107,19 @@ def with_modulus(
     indenter: Indenter,
     poisson: tuple[float, float] | None = None,
     tolerance: float = 0.25,
+    record: Record | None = None,
 ) -> Identification:
     """An identification with Young's modulus E [Pa] among its parameters.
+
+    If the force has a slope before the contact, or the tangents do not give E, E is that of the law above a straight
+    baseline, fitted to the approach with the contact point.
 
     Args:
         found: with its press.
         indenter: that pressed.
         poisson: Poisson's ratio and its standard deviation; None for anything from 0 to 0.5, equally likely.
         tolerance: largest half-width of an identified E's 95 % interval, as a share of its value.
+        record: position and force of the whole log, for the baseline.
 
     Raises:
         InputError: the log is not in N and m, or Poisson's ratio is impossible.
@@ -121,6 +129,9 @@ def with_modulus(
     if units != ("N", "m"):
         raise InputError(f"an indenter needs force in N and position in m, not {units[0]} and {units[1]}")
     modulus = _modulus(found.press, indenter, poisson, tolerance)
+    baseline = None if record is None else fit_baseline(record, indenter)
+    if baseline is not None and (baseline.tilted or modulus.verdict is not Verdict.IDENTIFIED):
+        modulus = _above_baseline(baseline, modulus, indenter, poisson, tolerance)
     return replace(found, parameters={"E": modulus, **found.parameters})
 
 
@@ -171,15 +182,7 @@ def _modulus(
             reason = f"the press goes {deep:.3g} mm deep, beyond the sphere's radius of {radius:.3g} mm"
             return Parameter.unknown("Pa", reason)
         parts["small strain"] = abs(_hertz_ratio(depth / indenter.size) - 1) * reduced
-    if poisson is None:
-        poisson_factor = sum(_UNKNOWN_POISSON) / 2
-        unknown = (_UNKNOWN_POISSON[1] - _UNKNOWN_POISSON[0]) / sum(_UNKNOWN_POISSON)
-    else:
-        poisson_factor = 1 - poisson[0] ** 2
-        unknown = NORMAL * abs(2 * poisson[0]) * poisson[1] / poisson_factor
-    parts["Poisson's ratio"] = unknown * reduced
-    parts = {cause: poisson_factor * part for cause, part in parts.items()}
-    return _judge_modulus(poisson_factor * reduced, parts, indenter, poisson, depth, tolerance)
+    return _judge_modulus(reduced, parts, indenter, poisson, depth, tolerance)
 
 
 def _modulus_by_depth(press: Press, slope: Array, force: Array, p: float, c: float, reduced: float) -> Array:
@@ -197,6 +200,139 @@ def _modulus_by_depth(press: Press, slope: Array, force: Array, p: float, c: flo
     return np.asarray(slope / (p * c * depths ** (p - 1)))
 
 
+_MAX_POINTS = 1000
+"""Maximum points of an approach that the law is fitted to; more are averaged."""
+_MIN_POINTS = 50
+_CONTACT_RANGE = (0.1, 0.9)
+"""Fractions of the approach between which the contact point is looked for."""
+_MAX_MISFIT = 0.005
+"""Root mean square of the residuals beyond white noise, over the force, above which law and baseline do not describe
+the approach: those of another indenter are 0.008 at least."""
+_UNLIKELY = 7.0
+"""Logarithm of the ratio to the largest likelihood from which on a contact point is left out: one in a thousand."""
+_TILTED = 3.3
+"""Standard deviations from which on a baseline has a slope (one in 1000)."""
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """The law of an indenter above a straight baseline: values with half-widths of their 95 % intervals.
+
+    Args:
+        reduced: E* [Pa].
+        contact: position of the contact point, on the log's own scale [m].
+        force, slope: of the baseline at the contact point [N], [N/m].
+        by_depth: difference of E* in the upper half of the depth, beyond its noise [Pa].
+        depth: of the press [m].
+        tilted: the slope is significant.
+    """
+
+    reduced: tuple[float, float]
+    contact: tuple[float, float]
+    force: tuple[float, float]
+    slope: tuple[float, float]
+    by_depth: float
+    depth: float
+    tilted: bool
+
+
+def fit_baseline(record: Record, indenter: Indenter) -> Baseline | None:
+    """Fit the law above a baseline to the approach of a log; None if they do not describe it.
+
+    Position and force may have either direction. The part up to half of the depth is fitted again: the two differ
+    where the press is none of that indenter on that half space.
+    """
+    finite = np.isfinite(record["position"] + record["force"])
+    position, force = record["position"][finite], record["force"][finite]
+    fits = []
+    for way in (1.0, -1.0):
+        top = int(np.argmax(way * position))
+        begin = int(np.argmin(way * position[: top + 1]))
+        size = max((top - begin) // _MAX_POINTS, 1)
+        x, f = (block_means(values[begin : top + 1], size) for values in (way * position, force))
+        for sign in (1.0, -1.0):
+            fit = _above_line(x, sign * f, indenter)
+            if fit is not None:
+                fits.append((fit[2], way, x, sign * f, fit))
+    if not fits:
+        return None
+    misfit, way, x, f, (theta, half, _) = min(fits, key=lambda entry: entry[0])
+    if misfit > _MAX_MISFIT or half[2] >= theta[2]:
+        return None
+    shallow = x < (theta[3] + x.max()) / 2
+    part = _above_line(x[shallow], f[shallow], indenter)
+    by_depth = theta[2] if part is None else max(abs(part[0][2] - theta[2]) - part[1][2], 0.0)
+    values = [(float(value), float(width)) for value, width in zip(theta, half, strict=True)]
+    contact = way * values[3][0], values[3][1]
+    tilted = abs(theta[1]) > _TILTED / NORMAL * half[1]
+    return Baseline(
+        values[2], contact, values[0], values[1], float(by_depth), float(x.max() - theta[3]), bool(tilted)
+    )
+
+
+def _above_line(x: Array, force: Array, indenter: Indenter) -> tuple[Array, Array, float] | None:
+    """Baseline at the contact [N], its slope [N/m], E* [Pa] and contact point [m]; half-widths; relative misfit.
+
+    The contact point is integrated over by its likelihood; None if E* is not above zero, or there are too few points.
+    """
+    if len(x) < _MIN_POINTS or np.ptp(x) == 0 or np.ptp(force) == 0:
+        return None
+    p, factor = _LAWS[indenter.shape]
+    low, reach = float(x.min()), float(np.ptp(x))
+
+    def fit(place: float) -> tuple[Array, Array, Array]:
+        depth = np.maximum(x - place, 0.0)
+        design = np.column_stack([np.ones(len(x)), x - place, factor(indenter.size) * depth**p])
+        scale = np.linalg.norm(design, axis=0)
+        theta = np.linalg.lstsq(design / scale, force, rcond=None)[0] / scale
+        gram = np.linalg.pinv((design / scale).T @ (design / scale)) / np.outer(scale, scale)
+        return theta, gram, force - design @ theta
+
+    places = low + reach * np.linspace(*_CONTACT_RANGE, 81)
+    for _ in range(4):  # finer about the most likely places
+        losses = np.array([float(np.sum(fit(place)[2] ** 2)) for place in places])
+        best = int(np.argmin(losses))
+        noise = estimate_noise(fit(places[best])[2], np.arange(len(x)), 4)
+        variance = max(noise.variance, 1e-300) * len(x) / noise.effective
+        likely = np.flatnonzero(losses - losses[best] < 2.0 * _UNLIKELY * variance)
+        ends = places[max(likely[0] - 1, 0)], places[min(likely[-1] + 1, len(places) - 1)]
+        places = np.linspace(*ends, 81)
+    fits = [fit(place) for place in places]
+    losses = np.array([float(residual @ residual) for *_, residual in fits])
+    weight = np.exp(-(losses - losses.min()) / (2.0 * variance))
+    weight /= weight.sum()
+    values = np.array([[*theta, place] for (theta, *_), place in zip(fits, places, strict=True)])
+    within = np.array([[*(variance * np.diag(gram)), 0.0] for _, gram, _ in fits])
+    mean = weight @ values
+    half = NORMAL * np.sqrt(weight @ (within + (values - mean) ** 2))
+    misfit = float(np.sqrt(max(losses.min() / len(x) - white_noise(force) ** 2, 0.0)) / np.ptp(force))
+    return (mean, half, misfit) if mean[2] > 0 else None
+
+
+def _above_baseline(
+    baseline: Baseline,
+    modulus: Parameter,
+    indenter: Indenter,
+    poisson: tuple[float, float] | None,
+    tolerance: float,
+) -> Parameter:
+    """Young's modulus above a baseline; the given one if the press is too deep."""
+    reduced, half = baseline.reduced
+    parts = {"tangent": half, "the indenter's law": baseline.by_depth}
+    if indenter.shape == "sphere":
+        if baseline.depth >= indenter.size:
+            return modulus
+        parts["small strain"] = abs(_hertz_ratio(baseline.depth / indenter.size) - 1) * reduced
+    judged = _judge_modulus(reduced, parts, indenter, poisson, baseline.depth, tolerance)
+    place, force, slope = (
+        quantity(*number[:1], symbol, number[1])
+        for number, symbol in ((baseline.contact, "m"), (baseline.force, "N"), (baseline.slope, "N/m"))
+    )
+    known, colon, terms = judged.reason.partition(": ")
+    line = f"above a baseline of {force} with a slope of {slope}, contact at {place}"
+    return replace(judged, reason=f"{known}, {line}{colon}{terms}")
+
+
 def _hertz_ratio(strain: float) -> float:
     """Force on a rigid sphere over Hertz's, which takes it for a paraboloid, by depth over radius (Sneddon)."""
     from scipy.optimize import brentq
@@ -206,13 +342,24 @@ def _hertz_ratio(strain: float) -> float:
 
 
 def _judge_modulus(
-    value: float,
+    reduced: float,
     causes: dict[str, float],
     indenter: Indenter,
     poisson: tuple[float, float] | None,
     depth: float,
     tolerance: float,
 ) -> Parameter:
+    """Young's modulus from E* with the half-widths of its causes [Pa]."""
+    if poisson is None:
+        factor = sum(_UNKNOWN_POISSON) / 2
+        unknown = (_UNKNOWN_POISSON[1] - _UNKNOWN_POISSON[0]) / sum(_UNKNOWN_POISSON)
+    else:
+        factor = 1 - poisson[0] ** 2
+        unknown = NORMAL * abs(2 * poisson[0]) * poisson[1] / factor
+    value = factor * reduced
+    causes = {
+        cause: factor * part for cause, part in (causes | {"Poisson's ratio": unknown * reduced}).items()
+    }
     main = max(causes, key=lambda cause: causes[cause])
     ratio = "Poisson's ratio 0 to 0.5 (none given)" if poisson is None else f"Poisson's ratio {poisson[0]:g}"
     radius = 1e3 * indenter.contact_radius(depth)

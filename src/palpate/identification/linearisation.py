@@ -88,16 +88,14 @@ class Linearisation:
         at, model_columns, target = _linearise(problem, model, lag, theta)
         free = list(model_columns)
         effects = causes.effect_columns(motion, model, lag, segments)
-        drift = problem.contacts.drift
-        drift_modes = drift.bends(problem.time).T if drift is not None else ()
-        drift_columns = {f"drift {i}": column for i, column in enumerate(drift_modes)}
+        removed = _removed_columns(problem, lag)
         if LAG in model_columns:
             effect_slopes = _moved_by_lag(effects, theta, segments, dt)
             model_columns = model_columns | {LAG: model_columns[LAG] + effect_slopes}
             target = target + effect_slopes * lag
-        named = model_columns | effects | drift_columns
+        named = model_columns | effects | removed
         columns = np.column_stack([*named.values(), target, motion.moved(0, lag)])
-        prior = dict.fromkeys(drift_columns, (0.0, 1.0))
+        prior = dict.fromkeys(removed, (0.0, 1.0))
         if LAG in free:
             prior[LAG] = (problem.lag.value, problem.lag.std)
         if problem.lag.mass is not None and "M" in free:
@@ -357,3 +355,14 @@ def _moved_by_lag(
     for segment in segments:
         derivative[segment.rows] = -np.gradient(force[segment.rows], dt)
     return derivative
+
+
+def _removed_columns(problem: Problem, lag: float) -> dict[str, Array]:
+    """What a removed drift or ripple may have left, each of standard deviation 1, by name."""
+    drift, ripple = problem.contacts.drift, problem.contacts.ripple
+    modes = drift.bends(problem.time).T if drift is not None else ()
+    columns = {f"drift {i}": column for i, column in enumerate(modes)}
+    if ripple is not None:
+        waves = ripple.std * ripple.columns(problem.time, problem.motion.moved(0, lag))
+        columns |= {f"ripple {i}": column for i, column in enumerate(waves)}
+    return columns

@@ -19,7 +19,7 @@ from palpate.identification.selection import Choice, choose
 from palpate.identification.uncertainty import Input, Parameter, Verdict, correlations
 from palpate.identification.verdicts import Units, verdicts
 from palpate.records import Record
-from palpate.signals.samples import block_means
+from palpate.signals.samples import block_means, robust_std
 from palpate.signals.types import NORMAL
 from palpate.units import impedance_units
 
@@ -100,6 +100,8 @@ def _outcome(log: _PreparedLog, choice: Choice, warnings: tuple[Warn, ...]) -> I
     options = log.options
     unit = log.impedance_units["K"]
     spectrum, press, point = gather_evidence(problem, options, unit, choice.answer)
+    if press is not None:
+        press = replace(press, pull_off=_pull_off(log.channels, problem.contacts))
     choice = _surface_alone(choice, options)
     parameters, parameter_warnings = verdicts(choice, point, options, log.units)
     warnings = (*warnings, *parameter_warnings)
@@ -127,6 +129,30 @@ def _outcome(log: _PreparedLog, choice: Choice, warnings: tuple[Warn, ...]) -> I
         inputs=_inputs(problem, options),
         correlation=_correlation(choice, parameters, point),
     )
+
+
+_MIN_PULL_STDS, _MIN_PULL_ROWS = 6.0, 3
+"""Standard deviations of the free force, and rows of it, from which on a force below its rest is an adhesion."""
+_MIN_PULL_FRACTION = 0.01
+"""Fraction of the largest force below which a force below the rest may be a drift."""
+
+
+def _pull_off(channels: Channels, contacts: Contacts) -> float | None:
+    """Largest force that holds the probe behind the deepest row of a contact [N]; None if none shows."""
+    if contacts.bonded:
+        return None
+    force = contacts.force_sign * channels.force - contacts.resting
+    outside = np.ones(len(force), bool)
+    behind = np.zeros(len(force), bool)
+    ends = [begin for begin, _ in contacts.spans[1:]] + [len(force)]
+    for (begin, end), next_begin in zip(contacts.spans, ends, strict=True):
+        outside[begin:end] = False
+        behind[begin + int(np.argmax(force[begin:end])) : next_begin] = True
+    noise = robust_std(force[outside]) if outside.any() else 0.0
+    least = max(_MIN_PULL_STDS * noise, _MIN_PULL_FRACTION * float(force.max()))
+    pulls = np.sort(-force[behind & channels.valid])[::-1]
+    sticks = len(pulls) > _MIN_PULL_ROWS and pulls[_MIN_PULL_ROWS - 1] > least
+    return float(pulls[0]) if sticks else None
 
 
 def _surface_alone(choice: Choice, options: Options) -> Choice:

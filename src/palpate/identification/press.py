@@ -18,6 +18,7 @@ from palpate.identification.slope import (
     Drag,
     loadings_in,
     loadings_read_later,
+    ripple_error,
     slope_between,
     tangent_at,
     upper_slope,
@@ -206,14 +207,14 @@ def _drag(answer: FittedParameters | None, force: float) -> Drag | None:
     return Drag(answer["B"], half + _DAMPING_VARIATION * abs(answer["B"]))
 
 
-def at_constant_speed(steady: SteadyPress, seen: Press | None, origin: float) -> Press:
+def at_constant_speed(steady: SteadyPress, seen: Press | None, origin: float, resting: float) -> Press:
     """A press at constant speed, with the lost work and the relaxation of the filtered contact, if there are any.
 
-    The curves of its strokes count from the position of the surface [m].
+    The curves of its strokes count from the position of the surface [m] and the force out of contact [N].
     """
     known = [slopes for slopes in (*steady.others, steady.headline) if slopes.stiffness.known_to(1.0)]
     tangents = [Tangent(slopes.force, slopes.stiffness) for slopes in known]
-    surface = np.array([[origin], [0.0]])
+    surface = np.array([[origin], [resting]])
     ordered = tuple(sorted(tangents, key=lambda slopes: slopes.force))
     curves = steady.loading - surface, steady.unloading - surface
     if seen is None:
@@ -250,7 +251,13 @@ def gather_evidence(
     if steady is not None:
         headline = _among_loadings(steady.headline, wider)
         headline = replace(headline, depth=headline.depth - problem.origin)
-        press = at_constant_speed(steady, press, problem.origin)
+        press = at_constant_speed(steady, press, problem.origin, problem.contacts.resting)
+    ripple = ripple_error(wider)
+    if headline is not None and ripple is not None:
+        headline = replace(headline, stiffness=headline.stiffness.with_cause("ripple", ripple))
+    if press is not None and ripple is not None:
+        tangents = (replace(t, slope=t.slope.with_cause("ripple", ripple)) for t in press.tangent)
+        press = replace(press, tangent=tuple(tangents))
     series = SeriesSpring.of(options)
     if series is not None:
         spectrum = series.spectrum(spectrum)

@@ -97,6 +97,7 @@ class Press(Compared):
         loading, unloading: depth [m] and force [N] in loading and unloading, shape (2, n); empty if it is not there.
         hysteresis_loss: share of the work put in that does not come back; None without an unloading.
         relaxation: None without a hold.
+        pull_off: largest force with which the surface holds the probe as it leaves [N]; None if none shows.
         late: by how much the force is read after the position by the work that comes back beyond what went in, and its
             half-width [s]; None if no more comes back.
     """
@@ -107,6 +108,7 @@ class Press(Compared):
     hysteresis_loss: float | None = None
     relaxation: Relaxation | None = None
     late: tuple[float, float] | None = None
+    pull_off: float | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Plain values that JSON can hold."""
@@ -118,7 +120,8 @@ class Press(Compared):
                 "half_time_s": self.relaxation.half_time,
                 "duration_s": self.relaxation.duration,
             }
-        return {"tangent": tangent, "hysteresis_loss": self.hysteresis_loss, "relaxation": relaxation}
+        loss = {"hysteresis_loss": self.hysteresis_loss, "pull_off_N": self.pull_off}
+        return {"tangent": tangent, **loss, "relaxation": relaxation}
 
 
 @dataclass(frozen=True)

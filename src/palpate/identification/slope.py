@@ -295,6 +295,16 @@ def _tangent_in(advance: Loading, force: float, within: float, drag: Drag) -> tu
     return slope - drag.value * speed_slope, variance, change, by_filter, drag.half * abs(speed_slope)
 
 
+def ripple_error(problem: Problem) -> Contribution | None:
+    """Error of a slope that the removed ripple may leave, the largest of all loadings; None without a ripple."""
+    ripple = problem.contacts.ripple
+    if ripple is None:
+        return None
+    loadings = loadings_in(problem, problem.lag.value)
+    upper = (loading.part(slice(_upper_rows(loading.force)[0], None)) for loading in loadings)
+    return Contribution(max((ripple.slope_std(part.time, part.depth) for part in upper), default=0.0))
+
+
 def jump_uncertainty(problem: Problem) -> float:
     """Relative error of a stiffness because the touch lies in a jump of the position between readings.
 

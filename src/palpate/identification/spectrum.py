@@ -19,7 +19,7 @@ from palpate.identification.in_series import SeriesSpring
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, WorkingPoint
-from palpate.identification.slope import jump_uncertainty, slope_in
+from palpate.identification.slope import jump_uncertainty, ripple_error, slope_in
 from palpate.identification.steady_press import Slopes
 from palpate.identification.uncertainty import Contribution, Measurement, Parameter, Verdict
 from palpate.signals.octaves import HIDDEN_SHARE, LINES, OVERLAP
@@ -272,6 +272,9 @@ def working_point(
     if bonded and not options.bonded:  # the first reading need not be in contact
         jump_error = Contribution.within(abs(slopes.stiffness.value) * jump_uncertainty(problem))
         slopes = replace(slopes, stiffness=slopes.stiffness.with_cause("unseen way", jump_error))
+    ripple = ripple_error(problem)
+    if ripple is not None:
+        slopes = replace(slopes, stiffness=slopes.stiffness.with_cause("ripple", ripple))
     resting = 0.0 if problem.counted else problem.contacts.resting
     point = build_working_point(replace(slopes, force=slopes.force - resting), source, problem, options, unit)
     falls = slopes.stiffness.value < 0 and not options.bonded

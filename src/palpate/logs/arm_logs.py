@@ -15,11 +15,13 @@ from palpate.errors import InputError, unknown
 from palpate.logs import bags
 from palpate.logs.formats import Kind, kind_of, open_table
 from palpate.logs.read import read_log
-from palpate.logs.roles import POSE, WRENCH
+from palpate.logs.roles import POSE, WRENCH, si_unit
 from palpate.records import Record
 from palpate.signals.rotations import quaternions_from
 
 PLACE = ("position_x", "position_y", "position_z")
+ABSENT = "-"
+"""Name of an axis without a column, along which force and motion are zero."""
 QUATERNION = ("quaternion_x", "quaternion_y", "quaternion_z", "quaternion_w")
 
 
@@ -188,9 +190,12 @@ def read_wrench_and_pose(
         columns = _columns("wrench", wrench, path, kind, bag) | _columns(
             "pose", pose, path, kind, bag, rotation
         )
-    record = read_log(path, **(options | columns))
-    oriented = with_quaternions(record.columns)
-    record = Record(oriented, {name: record.units.get(name, "1") for name in oriented}, record.meta)
+    absent = [role for role, name in columns.items() if name == ABSENT]
+    record = read_log(path, **(options | {role: columns[role] for role in columns if role not in absent}))
+    zeros = {role: np.zeros(len(record["time"])) for role in absent}
+    oriented = with_quaternions({**record.columns, **zeros})
+    units = {**record.units, **{role: si_unit(role) for role in absent}}
+    record = Record(oriented, {name: units.get(name, "1") for name in oriented}, record.meta)
     facts = [f"wrench of {wrench}, pose of {pose}", *record.meta.get("facts", ())]
     return Record(record.columns, record.units, {**record.meta, "facts": facts})
 
@@ -218,6 +223,8 @@ def _columns(
     """The columns of the wrench and the pose, by role."""
     roles, counts = _COUNTS[what]
     names = spec.split(",")
+    if {*names} == {ABSENT}:
+        raise InputError(f"--{what} {spec} names no column; write - only for an axis that the log lacks")
     if len(names) == 1:
         names = _of_topic(what, spec, bag) if bag else _of_matrix(what, spec, path, kind, rotation)
         if bag:

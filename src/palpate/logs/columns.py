@@ -30,6 +30,8 @@ _BLOCKS = 16
 """Blocks of a log over which a coherence is averaged, half overlapping: two columns of noise have about one over their
 number."""
 
+MIN_MOVING_FRACTION = 0.1
+"""Fraction of the largest speed below which a motion has no direction: a sine is below it in 6 % of its time."""
 _MIN_RATE_CORRELATION = 0.5**0.5
 """Correlation with the rate of a position above which that rate accounts for more than half of a column's power."""
 
@@ -245,6 +247,28 @@ def is_rate(column: ColumnStatistics, position: ColumnStatistics) -> bool:
     return float(readings @ position.unit_rate) > max(
         _MIN_RATE_CORRELATION, abs(float(readings @ position.unit_readings))
     )
+
+
+def direction_correlation(motion: ColumnStatistics, load: ColumnStatistics, *, speed: bool) -> float:
+    """Correlation of a load with the direction of a motion, without its sign, 0 to 1.
+
+    Args:
+        motion: a speed, or a position whose differences over a few rows are one.
+        load: a force or a torque.
+        speed: the motion is a speed.
+    """
+    a, b = motion.readings, load.readings
+    finite = np.isfinite(a) & np.isfinite(b)
+    a, b = a[finite], b[finite]
+    if not speed and len(a) > 4:
+        moves = int(np.count_nonzero(np.diff(a)))
+        rows = min(max(2 * len(a) // max(moves, 1), len(a) // 500, 2), len(a) // 4)
+        a, b = a[2 * rows :] - a[: -2 * rows], b[rows:-rows]
+    moves = np.abs(a) > MIN_MOVING_FRACTION * np.max(np.abs(a), initial=0.0)
+    signs, loads = np.sign(a[moves]), b[moves]
+    if len(loads) < 16 or np.ptp(signs) == 0 or np.ptp(loads) == 0:
+        return 0.0
+    return abs(float(_of_unit_length(signs) @ _of_unit_length(loads)))
 
 
 def roughness(column: ColumnStatistics) -> float:

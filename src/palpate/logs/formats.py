@@ -115,6 +115,8 @@ def open_table(
 ) -> Sheet:
     """A file of columns, read where they are asked for; with those of a second file that is joined by its time.
 
+    Two branches of a press side by side have columns for both, too.
+
     Raises:
         InputError: it cannot be read, or is larger than the limits; the times of the two do not overlap.
     """
@@ -128,6 +130,19 @@ def open_table(
         return join_sheets(
             open_table(path, kind, delimiter, limits), open_table(join, second, delimiter, limits)
         )
+    sheet = _open(path, kind, budget, delimiter)
+    if not _SECOND_BRANCH.search(" ".join(sheet.names)):
+        return sheet
+    from palpate.logs.joining import join_branches
+
+    return join_branches(sheet)
+
+
+_SECOND_BRANCH = re.compile(r"retract|withdraw|unload|retrace|(?:\b|_)rt(?:\b|_)", re.IGNORECASE)
+"""Words of a column that may be of the second of two branches."""
+
+
+def _open(path: Path, kind: Kind, budget: ReadingBudget, delimiter: str | None) -> Sheet:
     match kind:
         case Kind.MAT:
             from palpate.logs.tables.matlab import read_matlab

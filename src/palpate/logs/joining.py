@@ -1,7 +1,8 @@
-"""Two files of columns, joined by their times."""
+"""Two files of columns, joined by their times; two branches of a press side by side, joined one after the other."""
 
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from palpate.arrays import Array, Counts
 from palpate.errors import InputError
 from palpate.logs.columns import ColumnStatistics, read_columns
-from palpate.logs.proposal import clock_of, time_factor
+from palpate.logs.proposal import clock_of, side_by_side, time_factor
 from palpate.logs.tables.sheet import Cells, Sheet, Stated
 
 
@@ -99,3 +100,77 @@ def _at(time: Array, log: _Timed, column: Array) -> Array:
     near = np.unique(near[(instants >= time[0]) & (instants <= time[-1])])
     at[near] = np.interp(time[near], instants, values[finite])
     return at
+
+
+BRANCHES = (
+    ("extend", "retract"), ("extension", "retraction"), ("approach", "retract"), ("approach", "withdraw"),
+    ("loading", "unloading"), ("load", "unload"), ("trace", "retrace"), ("advance", "retract"), ("ex", "rt"),
+)  # fmt: skip
+"""Words by which the names of the two branches of a press differ."""
+
+
+def join_branches(sheet: Sheet) -> Sheet:
+    """A table with further columns for both branches of a press, if its columns are those of two branches.
+
+    The second branch follows the first. It is turned round if it ends where the first one does, and its time goes on
+    where the first ends. The columns have the names of the branches without the words by which these differ.
+    """
+    columns = [
+        ColumnStatistics(i, name, np.empty(0), sheet.stated.get(name, Stated(None)).unit, False)
+        for i, name in enumerate(sheet.names)
+    ]
+    groups = side_by_side(columns)
+    labels = next((pair for pair in BRANCHES if set(pair) == set(groups)), None)
+    if labels is None or sheet.tables:
+        return sheet
+    pairs = {}
+    for first, second in zip(groups[labels[0]], groups[labels[1]], strict=True):
+        name = re.sub(
+            rf"[\s_.\-]*{labels[0]}[\s_.\-]*", " ", first.name, count=1, flags=re.IGNORECASE
+        ).strip()
+        pairs[name if first is not second else f"{name} of both branches"] = first, second
+    if not {*pairs}.isdisjoint(sheet.names):
+        return sheet
+    names = [*sheet.names, *pairs]
+    joined = list(pairs.values())
+    place = next(pair for pair in joined if pair[0].named.kind == "position")
+
+    def read(places: Sequence[int], missing: Sequence[str]) -> tuple[list[Cells], list[dict[str, Any]]]:
+        plain = [i for i in places if i < len(sheet.names)]
+        further = [joined[i - len(sheet.names)] for i in places if i >= len(sheet.names)]
+        needed = list(
+            dict.fromkeys([*plain, *(column.place for pair in [*further, place] for column in pair)])
+        )
+        cells, notes = sheet.read(needed, missing)
+        by_place = dict(zip(needed, cells, strict=True))
+        shared = [by_place[column.place].numbers for column in place]
+        ends = [
+            int(np.flatnonzero(np.isfinite(values))[-1]) + 1 if np.isfinite(values).any() else 0
+            for values in shared
+        ]
+        turned = all(ends) and _ends_alike(shared[0][: ends[0]], shared[1][: ends[1]])
+
+        def join(pair: tuple[ColumnStatistics, ColumnStatistics]) -> Cells:
+            first, second = (by_place[column.place] for column in pair)
+            a, b = first.numbers[: ends[0]], second.numbers[: ends[1]]
+            if pair[0].named.kind == "time":
+                if len(a) > 1 and len(b) and not b[0] > a[-1]:
+                    b = b - b[0] + a[-1] + np.nanmedian(np.diff(a))
+            elif turned:
+                b = b[::-1]
+            return Cells(np.concatenate([a, b]), first.wrong or second.wrong, first.clock)
+
+        return [
+            by_place[i] if i < len(sheet.names) else join(joined[i - len(sheet.names)]) for i in places
+        ], notes
+
+    stated = {
+        name: sheet.stated[pair[0].name] for name, pair in pairs.items() if pair[0].name in sheet.stated
+    }
+    counts = lambda index: sheet.counts(index) if index < len(sheet.names) else None  # noqa: E731
+    return replace(sheet, names=names, read=read, counts=counts, stated=sheet.stated | stated)
+
+
+def _ends_alike(first: Array, second: Array) -> bool:
+    """True if the second branch ends, and does not begin, where the first one ends."""
+    return bool(abs(second[-1] - first[-1]) < abs(second[0] - first[-1]))

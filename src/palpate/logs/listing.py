@@ -16,7 +16,7 @@ from palpate.logs.arm_logs import is_pose, is_wrench
 from palpate.logs.columns import NAMES, ColumnStatistics, read_columns
 from palpate.logs.formats import Kind, kind_of, open_table
 from palpate.logs.presets import preset_among
-from palpate.logs.proposal import Proposal, clock_of, from_columns, time_factor
+from palpate.logs.proposal import MAX_LISTED, Proposal, clock_of, from_columns, time_factor
 from palpate.logs.read import is_run
 from palpate.logs.tables.sheet import Sheet
 from palpate.logs.tables.spreadsheet import equal_sheets
@@ -111,6 +111,11 @@ def list_log(
         text = f"{len(repeats)} sheets have the same columns and are pooled, as repeats of one test: "
         named = shorten(", ".join(sheet.name for sheet in repeats), 120)
         proposals = (replace(first, guesses=(*first.guesses, text + named)),)
+    if proposals[0].beside > MAX_LISTED:
+        used = {word.rpartition(":")[0] or word for word in proposals[0].words or ()}
+        shown = [c for c in columns if not {c.name, str(c.place)}.isdisjoint(used)]
+        entries = [_of_column(column, clock) for column in shown]
+        entries.append(SignalEntry(f"{len(columns) - len(shown)} more", "-", 0, None, None, None, "likewise"))
     facts = [f"{table.rate:g} rows a second, as the file states"] if table.rate else []
     return Listing(entries, unread + [note["text"] for note in table.notes], proposals, facts)
 

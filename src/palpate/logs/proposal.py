@@ -19,7 +19,14 @@ from palpate.logs.tables.sheet import Sheet
 from palpate.text import shorten
 from palpate.units import unit, unit_in_name
 
-_SIZES = {"length": (0.5, "m", "mm"), "force": (1000.0, "N", "g")}
+_SIZES = {
+    "length": (0.5, "m", "mm"),
+    "force": (1000.0, "N", "g"),
+    "torque": (np.inf, "Nm", "Nm"),
+    "angle": (2 * np.pi, "rad", "deg"),
+    "velocity": (5.0, "m/s", "mm/s"),
+    "angular velocity": (20.0, "rad/s", "deg/s"),
+}
 """Largest plausible range in SI units, and the assumed unit above it."""
 _MIN_POSITION_STEPS = 20
 """Steps of its resolution that a position moves over at least: from fewer no stiffness is known to 5 %."""
@@ -42,6 +49,15 @@ _EXAMPLE_RATE = 1000
 """Rate in the printed example [Hz]; no result depends on it."""
 
 
+MAX_LISTED = 8
+"""Logs side by side in one table that are proposed each; of more, the first one and their number."""
+PRESS = "identify it"
+WEIGH = "weigh the tool on the sensor"
+FRICTION = "identify the friction of the axis"
+SLIDE = "identify the friction of the slide in it"
+"""Purposes of a command."""
+
+
 @dataclass(frozen=True)
 class Proposal:
     """Options of `palpate identify LOG` or `palpate payload LOG`, and what of them is guessed.
@@ -50,24 +66,35 @@ class Proposal:
         options: by name, as `wrench_frame`; None if the log does not suffice.
         guesses: a sentence each.
         facts: what the log shows of itself, likewise.
-        verb: the command, `identify` or `payload`.
-        fallback: a second proposal, for a log that the first is refused for.
+        purpose: of the command, as words behind `to`.
+        beside: logs side by side in the table, of which it is one.
+        fallback: a second proposal, for a log that the first is refused for, or of which it identifies nothing.
     """
 
     options: Mapping[str, str] | None
     guesses: tuple[str, ...] = ()
     facts: tuple[str, ...] = ()
-    verb: str = "identify"
+    purpose: str = PRESS
     fallback: "Proposal | None" = None
+    beside: int = 1
+
+    @property
+    def verb(self) -> str:
+        """The command: `identify` or `payload`."""
+        return "payload" if self.purpose == WEIGH else "identify"
+
+    @property
+    def elsewhere(self) -> bool:
+        """True if no surface is identified: a tool is weighed, or an axis has friction."""
+        return self.purpose in {WEIGH, FRICTION}
 
     @property
     def words(self) -> tuple[str, ...] | None:
         """The options as words of the command line."""
         if self.options is None:
             return None
-        return tuple(
-            word for name, value in self.options.items() for word in (f"--{name.replace('_', '-')}", value)
-        )
+        named = ((f"--{name.replace('_', '-')}", value) for name, value in self.options.items())
+        return tuple(word for pair in named for word in pair if word)
 
     def command(self, log: Path) -> str | None:
         """The whole command, to be pasted into a shell."""
@@ -97,9 +124,15 @@ def from_columns(
     if all(f"{part}[{i}]" in members for part in ("q", "tau_ext_hat_filtered") for i in range(7)):
         return (Proposal(None, (_JOINTS_ONLY,)),)
     groups = side_by_side(rows)
+    several = len(groups) > MAX_LISTED
+    beside = f"one of {len(groups)} logs side by side"
     proposals = [
-        replace(proposal, facts=(f"{label!r}, one of {len(groups)} logs side by side", *proposal.facts))
-        for label, group in groups.items()
+        replace(
+            proposal,
+            facts=(f"{label!r}, {beside}{', which differ by that word' if several else ''}", *proposal.facts),
+            beside=len(groups),
+        )
+        for label, group in islice(groups.items(), 1 if several else None)
         if (proposal := _one_log(table, group, given)).options is not None
     ]
     return tuple(proposals) or (_one_log(table, rows, given),)
@@ -139,9 +172,11 @@ def _one_log(table: Sheet, rows: Sequence[ColumnStatistics], given: Mapping[str,
     for column in usable:
         if column.changes and not column.counts_rows:
             unique.setdefault(_identity(column), column)
+    other = _friction(table, [*unique.values()], {**given, **timing}, (*guesses,))
+    other = _in_plane(table, usable, {**given, **timing}, (*guesses,), other) or other
     pair = _pair([*unique.values()], guesses)
     if pair is None:
-        return Proposal(None, (_lacking(usable),))
+        return other or Proposal(None, (_lacking(usable),))
     position, force = pair
     position_spec = _with_unit(table, position, "length", guesses)
     force_spec = _with_unit(table, force, "force", guesses)
@@ -152,7 +187,49 @@ def _one_log(table: Sheet, rows: Sequence[ColumnStatistics], given: Mapping[str,
         facts.append(
             f"the cantilever of {table.spring:g} N/m, as the file states, is between position and surface"
         )
-    return Proposal(options, tuple(guesses), tuple(facts))
+    return Proposal(options, tuple(guesses), tuple(facts), fallback=other)
+
+
+_MIN_OPPOSED = 0.5
+"""Correlation of a force with the direction of the motion above which it may be a friction."""
+_SPEED = re.compile(r"vel|speed|twist|qd|dq|omega|rate", re.IGNORECASE)
+"""Names of a speed."""
+
+
+def _friction(
+    table: Sheet, columns: Sequence[ColumnStatistics], options: Mapping[str, str], guesses: Sequence[str]
+) -> Proposal | None:
+    """The command for the friction of an axis: a force or a torque that changes its sign with the direction."""
+    speeds = [c for c in columns if c.named.kind == "other" and _SPEED.search(c.name) and c.counts > 2]
+    places = [c for c in columns if c.named.kind in {"position", "joint", "orientation"}]
+    places = [c for c in places if c.counts >= _MIN_POSITION_STEPS]
+    loads = [c for c in columns if c.named.kind in {"force", "torque"}]
+    pairs = [
+        (opposed, load, motion)
+        for motion in (_measured(speeds) or _measured(places))
+        for load in _measured(loads)
+        if _of_one_number(motion, load)
+        and (opposed := statistics.direction_correlation(motion, load, speed=motion in speeds)) > _MIN_OPPOSED
+    ]
+    if not pairs:
+        return None
+    _, load, motion = max(pairs, key=lambda pair: pair[0])
+    notes = [*guesses]
+    turns = load.named.kind == "torque" or motion.named.kind in {"joint", "orientation"}
+    if motion in speeds:
+        name, spec = "velocity", _with_unit(table, motion, "angular velocity" if turns else "velocity", notes)
+    else:
+        name, spec = "position", _with_unit(table, motion, "angle" if turns else "length", notes)
+    named = {name: spec, "force_column": _with_unit(table, load, "torque" if turns else "force", notes)}
+    facts = [f"{load.name!r} has the direction of the motion: a friction"]
+    across = [c for c in loads if c is not load and c.named.kind == "force" and load.named.kind == "force"]
+    if len(across) == 1:
+        facts.append(
+            f"{across[0].name!r} is across the motion, {np.nanmean(across[0].values):.3g} on average: a slide's"
+            " coefficient is Fc over it"
+        )
+    none = Proposal(None, (_lacking(columns),))
+    return Proposal({**options, **named, "friction": ""}, tuple(notes), tuple(facts), FRICTION, none)
 
 
 def _lacking(columns: Sequence[ColumnStatistics]) -> str:
@@ -324,10 +401,14 @@ def _timing(
     if clock is None and table.rate is not None:
         return {}, None
     if clock is None:
-        places = [column for column in columns if column.named.kind == "position" and column.step]
-        if table.speed and places:
-            length = unit(places[0].unit or unit_in_name(places[0].name, "length") or "m").factor
-            return {"rate": f"{table.speed / (abs(places[0].step) * length):.4g}"}, None
+        place = next(
+            (column for column in columns if column.named.kind == "position" and column.changes), None
+        )
+        if table.speed and place:
+            length = unit(place.unit or unit_in_name(place.name, "length") or "m").factor
+            step = float(np.median(np.abs(np.diff(place.finite)))) * length
+            if step > 0:
+                return {"rate": f"{table.speed / step:.4g}"}, None
         named = [column.name for column in columns if column.named.kind == "time"]
         none = f"{named[0]!r} is no time that is read, and " if named else ""
         guesses.append(f"{none}the log does not state its rate: --rate {_EXAMPLE_RATE} is only an example")
@@ -476,6 +557,35 @@ def _call(table: Sheet, column: ColumnStatistics) -> str:
     return column.name if plain and table.names.count(column.name) == 1 else str(column.place)
 
 
+def _in_plane(
+    table: Sheet,
+    columns: Sequence[ColumnStatistics],
+    options: Mapping[str, str],
+    timing: tuple[str, ...],
+    friction: Proposal | None,
+) -> Proposal | None:
+    """The command for a slide with a force and a position along two axes; if it is none, its friction."""
+    for axes in ("xz", "yz", "xy"):
+        guesses = [*timing]
+        force = _triple(columns, "force", guesses, axes)
+        position = _triple(columns, "position", guesses, axes)
+        if force and position and all(column.changes for column in (*force, *position)):
+            named = {
+                option: ",".join(
+                    _with_unit(table, vector[axes.index(axis)], quantity, guesses) if axis in axes else "-"
+                    for axis in "xyz"
+                )
+                for option, vector, quantity in (("wrench", force, "force"), ("pose", position, "length"))
+            }
+            named |= {"wrench_frame": "base"}
+            none = friction or Proposal(None, (_lacking(columns),))
+            return Proposal({**options, **named}, (*guesses, _AXES_OF_BASE), (), SLIDE, none)
+    return None
+
+
+_AXES_OF_BASE = "the wrench's axes are taken for the base's: say --wrench-frame tool if they are the tool's"
+
+
 def _in_space(
     table: Sheet, columns: Sequence[ColumnStatistics], options: Mapping[str, str], timing: tuple[str, ...]
 ) -> Proposal | None:
@@ -496,13 +606,12 @@ def _in_space(
     pose += [_call(table, column) for column in turn]
     named = {**options, "wrench": ",".join(wrench), "pose": ",".join(pose)}
     moves = max(column.counts for column in position) >= _MIN_POSITION_STEPS
-    axes = "the wrench's axes are taken for the base's: say --wrench-frame tool if they are the tool's"
-    press = Proposal({**named, "wrench_frame": "base"}, (*guesses, axes)) if moves else None
+    press = Proposal({**named, "wrench_frame": "base"}, (*guesses, _AXES_OF_BASE)) if moves else None
     if not turned:
         return press
     axes = "the wrench's axes are taken for the tool's: say --wrench-frame base if they are the base's"
     angle = f"the tool turns by up to {np.degrees(_turn(turn)):.0f} degrees"
-    return Proposal({**named, "wrench_frame": "tool"}, (*guesses, axes), (angle,), "payload", press)
+    return Proposal({**named, "wrench_frame": "tool"}, (*guesses, axes), (angle,), WEIGH, press)
 
 
 _MIN_TURN = np.radians(30.0)

@@ -2,7 +2,7 @@
 
 # No annotations from the future: the command line looks for those of a base class where it inherits them.
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
@@ -22,6 +22,9 @@ from palpate.units import split_spec
 
 if TYPE_CHECKING:
     from palpate.logs.proposal import Proposal
+
+Choice = Callable[[Path, "Proposal"], "Proposal"]
+"""Picks a proposal for a log, or its fallback."""
 
 Rotation = Literal["quaternion", "quaternion-wxyz", "rotation-vector", "rpy", "matrix", "matrix-by-columns"]
 GB = 2.0
@@ -44,7 +47,8 @@ class Signals:
     force: str | None = None
     "Column of the force, in N if no unit is given; g is the reading of a scale. TOPIC.FIELD of a bag."
     wrench: str | None = None
-    "Topic of the wrench in a bag, if it is not the only one; or columns fx,fy,fz or fx,fy,fz,tx,ty,tz."
+    """Topic of the wrench in a bag, if it is not the only one; or columns fx,fy,fz or fx,fy,fz,tx,ty,tz; - for an
+    axis without a column."""
     pose: str | None = None
     "Topic of the pose in a bag, if it is not the only one; or columns x,y,z or x,y,z,qx,qy,qz,qw."
     rotation: Rotation = "quaternion"
@@ -79,53 +83,67 @@ class Signals:
         specs += [
             spec for specs_text in (self.wrench, self.pose) if specs_text for spec in specs_text.split(",")
         ]
-        return [split_spec(spec)[0] for spec in specs if spec]
+        return [split_spec(spec)[0] for spec in specs if spec and spec != "-"]
 
     @property
     def limits(self) -> ReadingLimits:
         """Limits of size and time."""
         return ReadingLimits(self.max_size * 1e9, self.max_seconds)
 
-    def complete(self, path: Path, *, known_frame: bool = False) -> tuple["Signals", dict[str, Any]]:
+    def complete(
+        self, path: Path, *, known_frame: bool = False, choose: Choice | None = None
+    ) -> tuple["Signals", dict[str, Any]]:
         """The signals with the names that a log's own names, units and values leave no doubt of.
 
         Args:
             path: of the log.
             known_frame: the axes of the wrench are given.
+            choose: picks a proposal or its fallback, whose guesses are then used; None if nothing may be guessed.
 
         Returns:
-            These signals; and the other options that follow from the names, as `wrench_frame` of a preset.
+            These signals; and the other options that follow from the names, as `wrench_frame` of a preset, with
+            `guessed`, the command and its guesses.
 
         Raises:
-            InputError: the log cannot be read, or something would have to be guessed.
+            InputError: the log cannot be read, or lacks a signal, or something would have to be guessed.
         """
         bag = kind_of(path).is_bag
         about = stored_about(path) if kind_of(path) is Kind.PARQUET else None
         if self.end is None and about is not None and SLIDE_END in about.meta:
-            return replace(self, end=_end_of_slide(path, about.meta)).complete(path, known_frame=known_frame)
+            cut = replace(self, end=_end_of_slide(path, about.meta))
+            return cut.complete(path, known_frame=known_frame, choose=choose)
         own_frame = {"wrench_frame"} & (about.meta.keys() if about else set())
         if not self.plain or is_run(path) or (not bag and _is_record(self._names(path))):
             return self, {name: about.meta[name] for name in own_frame} if about else {}
         from palpate.logs.listing import list_log
 
         listing = list_log(path, self.delimiter, self.limits, self.join)
-        if len(listing.proposals) > 1:
+        if listing.proposal.beside > 1:
             raise InputError(_list_several(path, listing.proposals))
-        proposal = listing.proposal
+        proposal = listing.proposal if choose is None else choose(path, listing.proposal)
         guesses = [
             guess
             for guess in proposal.guesses
             if not ((known_frame or own_frame) and "--wrench-frame" in guess)
         ]
-        if bag and (proposal.options is None or guesses):
+        if bag and (
+            proposal.options is None or (guesses and (choose is None or "wrench" in proposal.options))
+        ):
             return self, {}  # a bag's only wrench and pose need no names
-        if proposal.options is None or guesses or proposal.verb != "identify":
+        if proposal.options is None or proposal.elsewhere or (guesses and choose is None):
             raise InputError(_list_guesses(path, proposal))
         options: dict[str, Any] = dict(proposal.options)
         if "preset" in options:
             options = _with_underscores(preset(options.pop("preset"))) | options
-        fields = {name: value for name, value in options.items() if name in Signals.__dataclass_fields__}
+        makers: dict[str, Callable[[str], Any]] = {"rate": float, "join": Path}
+        fields = {
+            name: makers.get(name, str)(value)
+            for name, value in options.items()
+            if name in Signals.__dataclass_fields__
+        }
         remaining = {name: value for name, value in options.items() if name not in fields}
+        if guesses:
+            remaining["guessed"] = {"command": proposal.command(path), "guesses": guesses}
         return replace(self, **fields), remaining | {"read_as": shlex.join(proposal.words or ())}
 
     def read(self, path: Path, *, samples: bool = False) -> Record:
@@ -256,12 +274,13 @@ def _columns_of(table: Any, options: Mapping[str, Any]) -> dict[str, str]:
     )
 
 
-def read_as(record: Record, words: str) -> Record:
-    """A record that says as which signals it was read; as it is without words."""
+def read_as(record: Record, words: str, guessed: Mapping[str, Any] | None = None) -> Record:
+    """A record that says as which signals it was read, and what of that was guessed; as it is without words."""
     if not words:
         return record
-    facts = [f"read as {words}", *record.meta.get("facts", ())]
-    return Record(record.columns, record.units, {**record.meta, "facts": facts})
+    meta = {**record.meta, "guessed": guessed} if guessed else record.meta
+    facts = [f"read as {words}", *meta.get("facts", ())]
+    return Record(record.columns, record.units, {**meta, "facts": facts})
 
 
 def _end_of_slide(path: Path, about: Mapping[str, Any]) -> float:
@@ -284,7 +303,9 @@ def _with_underscores(options: dict[str, Any]) -> dict[str, Any]:
 
 def _list_guesses(path: Path, proposal: "Proposal") -> str:
     """The guesses of a log whose signals nobody named, and the command that would be tried."""
-    guesses = "; ".join(proposal.guesses) or "; ".join(proposal.facts)
+    if proposal.elsewhere:
+        return f"{path}: {'; '.join(proposal.facts)}. To {proposal.purpose}: {proposal.command(path)}"
+    guesses = "; ".join(proposal.guesses)
     if proposal.options is None:
         return f"{path}: {guesses} (palpate topics {path} lists them; --time, --position and --force-column name them)"
     return f"{path}: {guesses}. If that is right: {proposal.command(path)}"
@@ -293,4 +314,4 @@ def _list_guesses(path: Path, proposal: "Proposal") -> str:
 def _list_several(path: Path, proposals: "Sequence[Proposal]") -> str:
     """The commands for the logs that a table holds side by side."""
     commands = "; or: ".join(str(proposal.command(path)) for proposal in proposals)
-    return f"{path} holds {len(proposals)} logs side by side; identify one: {commands}"
+    return f"{path} holds {proposals[0].beside} logs side by side; identify one: {commands}"

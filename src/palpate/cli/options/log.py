@@ -61,7 +61,9 @@ class LogOptions(Signals):
                 f"--friction is of one axis: name its columns in {log} with {' and '.join(lacking)}"
                 f" (palpate topics {log} lists them)"
             )
-        reading = {name: getattr(self, name) for name in ("rate", "start", "end", "missing", "delimiter")}
+        reading = {
+            name: getattr(self, name) for name in ("rate", "start", "end", "missing", "delimiter", "join")
+        }
         return read_log(log, limits=self.limits, **reading, **columns)
 
 

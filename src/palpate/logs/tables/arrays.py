@@ -21,8 +21,6 @@ _EXTRAS = {"HDF5": ("h5py", "hdf5"), "TDMS": ("npTDMS", "tdms"), "AFM": ("afmfor
 """Library and extra of each format."""
 _MAX_OBJECTS = 10_000
 """Most groups and datasets, or channels, that are looked at."""
-_MAX_CURVES = 8
-"""Curves of an AFM map that are columns."""
 _NANOSECONDS = 1e9
 
 
@@ -202,7 +200,7 @@ def _afm(path: Path, size: float) -> tuple[dict[str, AnyArray], dict[str, Any]]:
     if not curves:
         raise InputError(f"{path} holds no force curve; export it as text")
     columns, units = {}, {}
-    for number, curve in enumerate(curves[:_MAX_CURVES], 1):
+    for number, curve in enumerate(curves, 1):
         for title in ("time", "force", "height (measured)", "height (piezo)"):
             if title in curve:
                 name = title if len(curves) == 1 else f"curve {number}.{title}"
@@ -216,6 +214,5 @@ def _afm(path: Path, size: float) -> tuple[dict[str, AnyArray], dict[str, Any]]:
     }
     about = curves[0].metadata
     timed = any(name.endswith("time") for name in columns)
-    more = {f"curves {_MAX_CURVES + 1} to {len(curves)}": "left out"} if len(curves) > _MAX_CURVES else {}
     rate = None if timed else about.get("rate approach")
-    return columns, {"units": units, "rate": rate, "spring": about.get("spring constant"), "left_out": more}
+    return columns, {"units": units, "rate": rate, "spring": about.get("spring constant")}

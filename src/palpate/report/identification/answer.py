@@ -321,7 +321,7 @@ def _foot(result: Identification, notes: Sequence[str]) -> Iterator[Text]:
     if other_codes:
         yield Text(f"Also noted: {', '.join(other_codes)} (--verbose explains each).", style="yellow")
     read = next((note for note in notes if note.startswith("read as ")), None)
-    if read is not None:
+    if read is not None and Code.SIGNALS_GUESSED.word not in result.codes:
         yield Text(printable(f"R{read[1:]}"))
 
 

@@ -1,6 +1,7 @@
 """An identification in words: the sentence, then each number and its limits."""
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,7 @@ ADVICE = {
     Code.IRREGULAR_TIME: "Log with the sensor's own clock if you can.",
     Code.SATURATED: "Press less, or use a sensor of a larger range.",
     Code.UNIT_GUESS: "Say the units, as in --position position_mm:mm.",
+    Code.SIGNALS_GUESSED: "Identify again by the printed command, with the right columns, units and axes.",
     Code.UNIT_DOUBTFUL: "Correct the unit; or name the column by its number, if its name is wrong.",
     Code.FORCE_DRIFTS: "Let the sensor warm up and tare it; it is removed as far as the log shows it.",
     Code.TOOL_INERTIA: "None, if the tool moves beyond the sensor; below zero: correct its compensation.",
@@ -188,6 +190,10 @@ def press_facts(result: Identification) -> list[str]:
     facts = [f"Slope by force: {', '.join(slopes)}."] if slopes else []
     if press.hysteresis_loss is not None:
         facts.append(f"{work_loss(press.hysteresis_loss)}.")
+    if press.pull_off is not None:
+        facts.append(
+            f"The surface holds the leaving probe with up to {quantity(press.pull_off, force)} (adhesion)."
+        )
     if press.relaxation is not None:
         relaxation = press.relaxation
         relaxed = f"{100 * relaxation.share:.2g} % of the force relaxes"
@@ -278,7 +284,13 @@ def _relative_half_width(p: Parameter) -> str:
     return f"{50 * (p.ci95[1] - p.ci95[0]) / abs(p.value):.2g} %"
 
 
-UNIT_WARNINGS = (Code.UNIT_DOUBTFUL, Code.TIME_DOUBTFUL, Code.COLUMNS_SWAPPED, Code.UNIT_GUESS)
+UNIT_WARNINGS = (
+    Code.SIGNALS_GUESSED,
+    Code.UNIT_DOUBTFUL,
+    Code.TIME_DOUBTFUL,
+    Code.COLUMNS_SWAPPED,
+    Code.UNIT_GUESS,
+)
 """Warnings by which the answer may be in another unit, or of another column; a guess is one until it is stated."""
 
 
@@ -330,6 +342,7 @@ class Source:
         command: that made the identification.
         made: when, in ISO 8601.
         notes: lines on how the log was read, such as the frame that a wrench was turned into.
+        guessed: `{"command", "guesses"}` if columns, units or axes were guessed.
     """
 
     file: str
@@ -338,6 +351,7 @@ class Source:
     command: str = "palpate identify"
     made: str | None = None
     notes: tuple[str, ...] = ()
+    guessed: Mapping[str, Any] | None = None
 
     @property
     def title(self) -> str:
@@ -360,6 +374,7 @@ def as_json(result: Identification, source: Source) -> dict[str, Any]:
     return {
         "file": source.file,
         **values,
+        "guessed": source.guessed,
         "options": {**source.options, **values["options"]},
         "sha256": source.sha256,
         "version": version("palpate"),
