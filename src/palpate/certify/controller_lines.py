@@ -40,7 +40,7 @@ def answer_lines(answer: dict[str, Any], written: Path | None) -> list[str]:
 
 
 def _claim(answer: dict[str, Any]) -> str:
-    """Lines that say which part is proved, which is only computed, and which is not modelled."""
+    """The proof, the result of computation alone, and the limits of the model."""
     proved, exact = answer["proved"]["stiffness"], answer["exact"]["stiffness"]
     model = (
         "The model is one axis that presses a spring without damping. Not modelled: "

@@ -358,7 +358,7 @@ def _moved_by_lag(
 
 
 def _removed_columns(problem: Problem, lag: float) -> dict[str, Array]:
-    """What a removed drift or ripple may have left, each of standard deviation 1, by name."""
+    """Remains that a removed drift or ripple may leave, each of standard deviation 1, by name."""
     drift, ripple = problem.contacts.drift, problem.contacts.ripple
     modes = drift.bends(problem.time).T if drift is not None else ()
     columns = {f"drift {i}": column for i, column in enumerate(modes)}
