@@ -1,4 +1,4 @@
-"""What the figures of the controllers stand on: the linear force loop, and friction compensation."""
+"""What the figures of the controllers stand on: the linear force loop."""
 
 from functools import reduce
 
