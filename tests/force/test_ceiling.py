@@ -190,5 +190,6 @@ def test_the_price_of_the_bound_is_the_time_of_the_travel():
     seconds, stiffness = tuning.price
     assert seconds == pytest.approx(F_D / stiffness * (1.0 / tuning.gains.speed - 1.0 / 0.25))
     assert tuning.to_json()["force_max"] == 100.0
+    assert type(tuning.to_json()["speed_m_s"]) is float  # NumPy's numbers are no JSON
     assert tuning.to_json()["price_s"] == seconds
     assert prove().price is None

@@ -10,7 +10,7 @@ import pytest
 
 from identification.synthetic_contacts import pressed, shaken
 from palpate.identification import identify
-from palpate.identification.budget import FittedParameters, Spread
+from palpate.identification.budget import FittedParameters, Spread, white_level
 from palpate.identification.uncertainty import (
     Contribution,
     Measurement,
@@ -144,3 +144,8 @@ def test_the_calibration_is_a_cause_of_the_working_point_too(logs):
     found = logs[2]
     part = found.working_point.stiffness.contributions["calibration"]
     assert part.std == pytest.approx(0.02 * abs(found.working_point.stiffness.value))
+
+
+def test_octaves_without_lines_have_no_level_of_noise():
+    assert white_level(np.ones(3), np.zeros(3)) == 0.0
+    assert white_level(np.array([1.0, 9.0]), np.array([0.0, 5.0])) == 9.0

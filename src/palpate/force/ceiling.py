@@ -62,7 +62,7 @@ def force_ceiling(arm: Arm, force: float, force_max: float, cap: float, theta: f
         cap: stiffest surface, K + B/theta [N/m].
         theta: whole lag of the loop, by which the cap counts damping [s].
     """
-    return (force_max - force - reading_error(arm, force)) / force_per_speed(arm, cap, theta)
+    return float((force_max - force - reading_error(arm, force)) / force_per_speed(arm, cap, theta))
 
 
 FORCE_MAX_RATIO = 5.0

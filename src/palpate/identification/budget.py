@@ -198,11 +198,11 @@ def unexplained_spread(system: System, solution: Solution, sensor: Array, sensor
 
 
 def white_level(level: Array, lines: Array) -> float:
-    """Level of white noise: the mean of as many of the quietest octaves as differ by chance alone.
+    """Level of white noise: the mean of as many of the quietest octaves as differ by chance alone; 0 without lines.
 
     Args:
         level: variance of a line in each octave, over that of white noise of variance 1, shape (octaves,).
-        lines: number of lines behind each level, shape (octaves,); at least one is not 0.
+        lines: number of lines behind each level, shape (octaves,).
 
     Source: Bartlett's test of equal variances, at 95 %.
     """
@@ -210,6 +210,7 @@ def white_level(level: Array, lines: Array) -> float:
 
     order = np.argsort(level)
     order = order[lines[order] > 0]
+    pooled = 0.0
     for size in range(len(order), 0, -1):
         levels = np.maximum(level[order[:size]], 1e-300)
         count = lines[order[:size]]
