@@ -49,6 +49,8 @@ def test_a_spec_without_a_name_is_refused():
 def test_a_unit_in_a_name_must_fit():
     assert unit_in_name("position_mm", "length") == "mm"
     assert unit_in_name("pos [um]", "length") == "um"
+    assert unit_in_name("Fz, gf", "force") == "gf"
+    assert [unit_in_name(name, "time") for name in ("Millis", "elapsedMicros", "ms")] == ["ms", "us", "ms"]
     assert unit_in_name("force_mN", "length") is None
     assert unit_in_name("position", "length") is None
 

@@ -115,7 +115,9 @@ _MAX_TRIED_BYTES = 200e6
 
 def try_proposal(log: Path, proposal: "Proposal") -> "Proposal":
     """A proposal whose command answers, or else its fallback; the reason in place of a command that is refused."""
-    return _tried(log, proposal)[0]
+    from palpate.logs.formats import sheets_as_logs
+
+    return _tried(sheets_as_logs((log,), (), Signals().limits)[0], proposal)[0]
 
 
 def choose_proposal(log: Path, proposal: "Proposal") -> "Proposal":

@@ -80,6 +80,8 @@ _ALIASES = {
     "millimeters": "mm",
     "meters": "m",
     "milliseconds": "ms",
+    "millis": "ms",
+    "micros": "us",
     "microseconds": "us",
     "nanoseconds": "ns",
     "newton": "N",
@@ -129,9 +131,12 @@ def split_spec(spec: str) -> tuple[str, str | None]:
 
 
 def unit_in_name(name: str, quantity: str) -> str | None:
-    """The unit that a column's name carries, such as `mm` in `position_mm` or `pos [mm]`, if it fits the quantity."""
+    """The unit that a column's name carries, as `mm` in `pos_mm`, `pos [mm]` and `pos, mm`, if it fits the quantity."""
     name = re.sub(r"([\])])\.\d+$", r"\1", name)  # pandas numbers repeated names
     name = re.sub(r"_(mm?|rad|deg)_s$", r"_\1/s", name)
+    name = re.sub(r",\s*([^\s,]+)$", r"_\1", name)  # Force, N
+    if quantity == "time":
+        name = re.sub(r"^([mun]s)$|((?:milli|micro|nano)s(?:econds)?)$", r"_\1\2", name.lower())
     tail = name.rstrip(" ])").replace("[", "_").replace("(", "_").rsplit("_", 1)
     if len(tail) < 2:
         return None

@@ -43,6 +43,17 @@ def test_equal_sheets_are_proposed_as_a_pool_and_identified_as_one(book, capsys)
     assert {one["sha256"] for one in found["files"]} == {file_digest(book)}
 
 
+def test_a_pool_of_sheets_is_tried_before_it_is_printed(book, capsys):
+    assert main(["topics", str(book), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["identify"]["command"] == list_log(book).proposal.command(book)
+
+
+def test_the_longest_sheet_is_left_for_one_with_force_and_position(tmp_path):
+    long = [["Time (s)", "Byte"], *([a / 200, a % 7] for a in range(3 * len(T)))]
+    book = spreadsheet(tmp_path / "tests.xlsx", {"Bus": long, "Press": sheet(1000.0)})
+    assert list_log(book).proposal.options["force"] == "Press.Load (N):N"
+
+
 def test_one_sheet_of_a_book_is_a_log(book):
     columns = {"time": "t (s)", "position": "Extension (mm)", "force": "Load (N)"}
     record = read_log(book / "Specimen 2", **columns)

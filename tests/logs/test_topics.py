@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -328,6 +329,24 @@ def test_of_columns_without_names_the_one_whose_motion_two_others_follow_is_the_
     assert ("both follow the motion of '2'" in " ".join(proposal.guesses)) == friction
 
 
+def test_six_columns_without_names_are_not_told_apart(tmp_path):
+    """Three forces move together, and so do three places: which is which no number says."""
+    t = np.arange(2000) / 100
+    moves = [np.sin(a * t) + 0.1 * np.sin(7 * a * t) for a in (1.0, 1.1, 1.3)]
+    path = tmp_path / "log.csv"
+    np.savetxt(path, np.column_stack([t, *moves, *(9 * np.maximum(move, 0) for move in moves)]), "%.4f", ",")
+    proposal = list_log(path).proposal
+    assert proposal.options is None
+    assert "name both" in proposal.guesses[0]
+
+
+def test_two_readings_of_one_quantity_are_no_position_and_force(tmp_path):
+    """Two sensors of one pressure are equally rough, and so neither is the position."""
+    rng, t = np.random.default_rng(1), np.arange(2000) / 100
+    noise = 0.1 * rng.standard_normal((2, len(t)))
+    assert proposed(tmp_path, "0,1,2", t, *(24 + np.sin(t) + noise)).options is None
+
+
 def test_of_columns_without_names_a_slow_drift_is_no_position(tmp_path):
     """A temperature has a value of its own at each time, and so has each push: neither is the cause of the other."""
     t = np.arange(0, 60, 0.005)
@@ -537,13 +556,13 @@ def test_repeated_stamps_are_a_time(tmp_path):
 
 
 KINDS = {
-    "time": "t ts Zeit t_ms Time(sec) header.stamp",
+    "time": "t ts Zeit t_ms Time(sec) header.stamp tcp_force.time",
     "position": "z Pos_Z(mm) Extension tcp_x Crosshead[mm] Weg ee.pos.1 AI0_mm height~(measured) place",
     "force": "Fz Force_X Load fn Standardkraft wrench.2 weight_g TCPForceZ x_F.0 AI1_mN",
     "torque": "Tx tau_J[0] wrench.5 field.wrench.torque.z",
     "orientation": "qw rx roll pose.orientation.x angle_deg",
     "joint": "q_3 joint_1 jointPos_2",
-    "other": "qd_0 acc_x vx RDT~Sequence Status(hex) temperature_C pressure_kPa Position~Error T-B(V) O_T_EE[12]",
+    "other": "qd_0 acc_x vx RDT~Sequence Status(hex) temp_C pressure_kPa Position~Error T-B(V) O_T_EE[12] Post-Test~2",
 }
 
 
@@ -556,3 +575,12 @@ def test_names_and_units_say_the_quantity(kind):
 @pytest.mark.parametrize("name", ["AI0", "c1", "3", "-", "channel_a"])
 def test_a_name_that_says_nothing_vetoes_nothing(name):
     assert read_name(name).kind is None
+
+
+def test_the_table_of_public_files_is_complete():
+    table = tomllib.loads((Path(__file__).parent / "public_files.toml").read_text(encoding="utf-8"))["file"]
+    fields = {"repository", "path", "commit", "licence", "kind", "result", "wrong_roles"}
+    assert len(table) >= 20
+    assert len({entry["kind"] for entry in table}) >= 8
+    assert all(entry.keys() == fields and len(entry["commit"]) == 40 for entry in table)
+    assert {entry["wrong_roles"] for entry in table} <= {0, 1}

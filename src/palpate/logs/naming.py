@@ -32,7 +32,7 @@ _WORDS = {
         r"f[nxyzrt]?$"
     ),
     "position": (
-        r"pos|disp|dist|depth|indent|height|travel|stroke|extens|elong|[a-z]*weg$|hub$|lvdt|verschieb|verform|traverse|"
+        r"pos(?!t$)|disp|dist|depth|indent|height|travel|stroke|extens|elong|[a-z]*weg$|hub$|lvdt|verschieb|verform|traverse|"
         r"deplac|déplac|desplaz|spostam|deform|crosshead|separation|penetr|place$|path$|gap$|zsn|zsensor|位移|変位"
     ),
     "time": (
@@ -62,6 +62,8 @@ _VECTOR = re.compile(
     re.IGNORECASE,
 )
 """Number of a list, as `wrench.2`, `pose[0]` and `ee.pos.1`."""
+_TIME_MEMBER = re.compile(r"[._](?:time|timestamp)$", re.IGNORECASE)
+"""Time of a structure or a sensor, as `tcp_force.time`."""
 _LENGTH_LIMIT = 60
 """Longest name that is looked at: others are text."""
 
@@ -110,7 +112,7 @@ def read_name(name: str, stated: str = "") -> ColumnName:
     suffix = ending[1] if ending and known_unit(ending[1]) else ""
     if "current" in lower and (_now(lower) or _quantity(suffix) in {"position", "force"}):
         lower.remove("current")
-    kind = _kind(lower)
+    kind = "time" if _TIME_MEMBER.search(plain) else _kind(lower)
     worded = kind is not None
     quantity = _quantity(stated or symbol)
     if not quantity and kind in {None, "time"} and suffix:  # AI0_mm; force_mN has a word
@@ -120,9 +122,8 @@ def read_name(name: str, stated: str = "") -> ColumnName:
     axis, stem = _axis(lower)
     if kind is None and axis and (not stem or any(_PLACE.match(token) for token in stem)):
         kind = "position"
-    if kind is None and any(_BOOKKEEPING.match(token) for token in lower):
-        kind = "other"
-    if kind is None and not all(_OPAQUE.fullmatch(token) for token in lower):
+    counter = any(_BOOKKEEPING.match(token) for token in lower)
+    if kind is None and (counter or not all(_OPAQUE.fullmatch(token) for token in lower)):
         kind = "other"
     return ColumnName(kind, axis, stem, any(_COMMAND.match(token) for token in lower), worded)
 

@@ -39,6 +39,12 @@ noise it is under a tenth (`filtered_power`)."""
 _MAX_PAIRS = 800
 """Most pairs of columns that are compared, the 780 of 40 columns without names among them: that takes seconds."""
 _NO_PAIR = "no two columns are a position that moves and a force that follows it"
+_UNNAMED = "the columns have no names, and their numbers do not tell the position from the force: name both"
+_MAX_UNNAMED = 3
+"""Columns without names that are told apart by their numbers: a position, and two that follow it."""
+_MIN_ROUGHER = 2.0
+"""Roughness of a force over that of its position, above which the smoother of two columns is taken for the position:
+two readings of one quantity have 1.0, and a force has 15 and more in the tests."""
 _JOINTS_ONLY = (
     "the columns are those of libfranka's logToCSV: joints and their torques, without wrench and pose of the tip;"
     " record O_F_ext_hat_K and O_T_EE of RobotState with its time, which --preset franka reads"
@@ -115,8 +121,9 @@ def from_columns(
         columns: of it, in its order.
         given: options that each command repeats.
     """
-    length = max((len(column.values) for column in columns), default=0)
-    rows = [column for column in columns if len(column.values) == length]
+    lengths = sorted({len(column.values) for column in columns}, reverse=True)
+    tables = [[column for column in columns if len(column.values) == length] for length in lengths]
+    rows = next(filter(_presses, tables), tables[0] if tables else [])
     members = {_member(column.name): column for column in rows}
     name = preset_among(members)
     if name is not None:
@@ -136,6 +143,12 @@ def from_columns(
         if (proposal := _one_log(table, group, given)).options is not None
     ]
     return tuple(proposals) or (_one_log(table, rows, given),)
+
+
+def _presses(rows: Sequence[ColumnStatistics]) -> bool:
+    """True if the names of one table of a file, as a sheet or a group of channels, say a position and a force."""
+    kinds = {column.named.kind for column in rows}
+    return {"position", "force"} <= kinds and len(rows[0].values) >= _MIN_POSITION_STEPS
 
 
 def _by_preset(
@@ -250,7 +263,7 @@ def _lacking(columns: Sequence[ColumnStatistics]) -> str:
     if places and not forces and not any(column.may_be("force") for column in moving):
         listed = shorten(", ".join(places), _LISTED)
         return f"a position ({listed}) and no force: join the log of the force with --join FILE"
-    return _NO_PAIR
+    return _UNNAMED if moving[1:] and all(column.named.kind is None for column in moving) else _NO_PAIR
 
 
 _LISTED = 80
@@ -469,11 +482,9 @@ def _pair(
     )
     if _of_one_axis(position, force):
         pairs = [pair for pair in pairs if _of_one_axis(*pair)]
-    unused = dict.fromkeys(
-        column.name for pair in pairs for column in pair if column not in (position, force)
-    )
-    if by_name and unused:
-        listed = ", ".join([*unused][:8])
+    others = [column for pair in pairs for column in pair if column not in (position, force)]
+    if by_name and others:
+        listed = ", ".join([*dict.fromkeys(column.name for column in others)][:8])
         guesses.append(f"{position.name!r} and {force.name!r} are used; the names of {listed} fit too")
     elif not by_name and (places or forces):
         reference, partner = (position, force) if places else (force, position)
@@ -481,6 +492,11 @@ def _pair(
     elif not by_name:
         smooth, rough = sorted((position, force), key=statistics.roughness)
         cause = _cause(moving, smooth, rough)
+        alike = statistics.roughness(rough) < _MIN_ROUGHER * statistics.roughness(smooth)
+        if (alike and not cause) or (
+            len(moving) > _MAX_UNNAMED and not _other_units(others, (smooth, rough))
+        ):
+            return None
         position, force = (smooth, rough) if cause is None else (cause, smooth)
         why = "the smoother is" if cause is None else f"both follow the motion of {cause.name!r}, which is"
         guesses.append(
@@ -488,6 +504,11 @@ def _pair(
             " the position"
         )
     return position, force
+
+
+def _other_units(columns: Sequence[ColumnStatistics], chosen: Sequence[ColumnStatistics]) -> bool:
+    """True if each of the columns is one of the chosen ones in another unit."""
+    return all(any(statistics.is_one_reading(a, b) for b in chosen) for a in columns)
 
 
 def _measured(columns: Sequence[ColumnStatistics]) -> Sequence[ColumnStatistics]:
