@@ -385,7 +385,8 @@ def student95(errors: Array, field: Array, noise: Array) -> float:
 
 def _mixing_weights(s: Array, shape: Array, scale: Array) -> Array:
     """Weights of the factors s under inverse gamma distributions, a row of sum 1 each."""
-    weights = np.exp(-shape * np.log(s) - scale / s)
+    exponent = -shape * np.log(s) - scale / s
+    weights = np.exp(exponent - exponent.max(axis=-1, keepdims=True))
     return np.asarray(weights.reshape(-1, len(s)) / weights.sum(axis=-1).reshape(-1, 1))
 
 

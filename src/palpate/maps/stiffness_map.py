@@ -249,6 +249,8 @@ class StiffnessMap:
         """
         half = _number("the half-width", half, 1.0 / LARGEST, LARGEST)
         max_variance = (np.log1p(half) / self.process.z95) ** 2 - self._common**2
+        if not max_variance > 0.0:
+            return None
         covariance = self.process.likeliest.covariance(self._candidates())
         noise = self._noise
         presses = choose(covariance, np.ones(len(covariance)), noise)

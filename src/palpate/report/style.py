@@ -166,8 +166,9 @@ def logarithmic(axis: Axes, which: str) -> None:
 
 def legend(axis: Axes, **options: Any) -> None:
     """The legend above the panel, out of the way of the data."""
-    options = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": 6, "frameon": False, **options}
-    axis.legend(fontsize=8.5, borderaxespad=0.2, columnspacing=1.2, handlelength=1.5, **options)
+    place = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": 6, "frameon": False}
+    spaces = {"fontsize": 8.5, "borderaxespad": 0.2, "columnspacing": 1.2, "handlelength": 1.5}
+    axis.legend(**place | spaces | options)
 
 
 def literal(text: str) -> str:

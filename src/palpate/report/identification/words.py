@@ -47,6 +47,7 @@ ADVICE = {
     Code.SIGNALS_GUESSED: "Identify again by the printed command, with the right columns, units and axes.",
     Code.UNIT_DOUBTFUL: "Correct the unit; or name the column by its number, if its name is wrong.",
     Code.FORCE_DRIFTS: "Let the sensor warm up and tare it; it is removed as far as the log shows it.",
+    Code.FORCE_RIPPLES: "Remove its cause, such as mains, vibration or interference; or record more free motion.",
     Code.TOOL_INERTIA: "None, if the tool moves beyond the sensor; below zero: correct its compensation.",
     Code.FORCE_SIGN_REVERSED: "None, if the column is the right one.",
     Code.POSITION_SIGN_REVERSED: "None, if the column is the right one.",
