@@ -70,6 +70,8 @@ def verdicts(
             parameters[name] = replace(parameter, verdict=Verdict.NOT_IDENTIFIABLE, reason=refused)
     if tangent is not None:
         parameters = _press_stiffness(parameters, tangent)
+    elif point is not None and point.source == "press":
+        parameters = _agreeing(parameters, point.stiffness)
     return parameters, _warnings(parameters, fitted, choice.problem, options.tolerance)
 
 
@@ -198,6 +200,19 @@ def _press_stiffness(parameters: dict[str, Parameter], point: WorkingPoint) -> d
     ]
     best = min(identified, key=lambda parameter: parameter.std or np.inf, default=point.stiffness)
     return parameters | rejected | {"K": best}
+
+
+def _agreeing(parameters: dict[str, Parameter], slope: Parameter) -> dict[str, Parameter]:
+    """K is not identified where it excludes the slope of the press, less the branch by which a solid relaxes."""
+    K = parameters.get("K")
+    both = K is not None and K.verdict is slope.verdict is Verdict.IDENTIFIED and K.unit == slope.unit
+    if not (both and K and K.ci95 and slope.ci95):
+        return parameters
+    branch = parameters["K1"].ci95 if "K1" in parameters else None
+    if K.ci95[0] <= slope.ci95[1] and slope.ci95[0] <= K.ci95[1] + (branch[1] if branch else 0.0):
+        return parameters
+    reason = "it contradicts the slope of the press, of the first line: the stiffness changes with the force"
+    return parameters | {"K": replace(K, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)}
 
 
 def _reject_negative(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Parameter]:
