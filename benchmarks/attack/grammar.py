@@ -286,8 +286,8 @@ def names(chance: random.Random, folder: Path) -> Words:
     name = "".join(chance.choice(parts) for _ in range(chance.choice((1, 1, 2)))) + chance.choice(
         (".csv", "", ".CSV", ".txt")
     )
-    path = folder / "named" / name
-    path.parent.mkdir(exist_ok=True)
+    (folder / "named").mkdir(exist_ok=True)
+    path = folder / "named" / name  # of the name ".", the folder
     _copied(folder / "whole.csv", path)
     said = str(path) if chance.random() < 0.5 else f"named/{name}"
     more = chance.choice(
