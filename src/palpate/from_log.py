@@ -169,7 +169,7 @@ def _try(log: Path, proposal: "Proposal") -> "tuple[Proposal, bool]":
         from palpate.contact_frame.tool_payload import weigh
 
         frame = ContactFrame(wrench_frame=options.pop("wrench_frame"))
-        return proposal, weigh(Signals(**options).read(log), frame, _TOLERANCE).payload is not None
+        return proposal, weigh(Signals(**options).read(log), frame).payload is not None
     if proposal.purpose == FRICTION:
         from palpate.contact_frame.axis_friction import identify_friction
 
@@ -180,10 +180,6 @@ def _try(log: Path, proposal: "Proposal") -> "tuple[Proposal, bool]":
     if result.slide is not None:
         return replace(proposal, purpose=SLIDE), True
     return proposal, result.identified and proposal.purpose == PRESS
-
-
-_TOLERANCE = 0.25
-"""Relative half-width up to which a mass counts as identified: the default of `palpate payload`."""
 
 
 def accept_stated_units(

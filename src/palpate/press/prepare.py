@@ -23,6 +23,7 @@ from palpate.press.setting import GAP, Place, cell_of, check_able, held_tool, pl
 from palpate.press.simulated_arm import NO_FREE_FORCE, PoseForce, SimulatedArm
 from palpate.press.summary import PressRequest
 from palpate.press.tip_controller import CONTROLLERS, TorqueDriver
+from palpate.press.unload import SLOW
 from palpate.records import Record
 from palpate.robots.serial.from_toml import names
 from palpate.robots.serial.loading import mujoco
@@ -113,7 +114,7 @@ class PreparedPress:
     def _free_stroke(self, resting: SimulatedArm, gains: Gains, arm: SimulatedArm) -> dict[str, Any]:
         """Make the free stroke with the arm that rested; take its slope off the readings of the other."""
         reach = gains.approach * self.plan.longest
-        speed = min(10.0 * gains.approach, gains.speed_at(self.plan.force))
+        speed = min(SLOW * gains.approach, gains.speed_at(self.plan.force))
         plan = StrokePlan(self.request.place.normal, reach, speed, gains, self.plan.force)
         free = make_stroke(resting, plan)
         arm.slope = free.slope_to_subtract(reach, gains.level)

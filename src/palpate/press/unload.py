@@ -26,6 +26,8 @@ REST_LAGS = 3
 
 While the force still falls it is given as many again.
 """
+SLOW = 10.0
+"""Approach speeds that a stroke in free motion, and a retreat without haste, may have."""
 
 
 class Glimpse(NamedTuple):
@@ -211,7 +213,7 @@ def simulated_retreat(gains: Gains, normal: Array, depth: float, force: float) -
     return RetreatPlan(
         gains=gains,
         normal=normal,
-        speed=min(10.0 * gains.approach, gains.arm.limits.speed),
+        speed=min(SLOW * gains.approach, gains.arm.limits.speed),
         clearance=CLEARANCE,
         depth=max(depth, 0.0),
         noise=gains.arm.sensor.noise,

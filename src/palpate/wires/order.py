@@ -17,7 +17,7 @@ from palpate.force.sliding.slide_state import beside
 from palpate.press.at_rest import TARE
 from palpate.press.free_stroke import StrokePlan
 from palpate.press.sequence import Plan
-from palpate.press.unload import REST_LAGS
+from palpate.press.unload import REST_LAGS, SLOW
 from palpate.wires.wire import Triple, triple
 
 
@@ -150,7 +150,7 @@ class Order:
 
         Half the limit: of an arm that does not stamp its positions, a late one shows the way of several ticks.
         """
-        return min(0.5 * self.limits.speed, 10.0 * self.loop.gains.approach)
+        return min(0.5 * self.limits.speed, SLOW * self.loop.gains.approach)
 
     @property
     def stroke(self) -> StrokePlan | None:
