@@ -102,7 +102,11 @@ def experiment_sentences() -> frozenset[str]:
     """Names of the sentences of the thesis about its experiments: those of halves.toml."""
     text = (resources.files("palpate_thesis") / "inference" / "halves.toml").read_text("utf-8")
     figures = tomllib.loads(text).values()
-    return frozenset(id_ for figure in figures for id_ in (*figure["claims"], *figure.get("besides", ())))
+    return frozenset(
+        id_
+        for figure in figures
+        for id_ in (*figure.get("states", ()), *figure["claims"], *figure.get("besides", ()))
+    )
 
 
 def often(holds: Iterable[bool]) -> bool:
@@ -176,7 +180,6 @@ def claim(id_: str, holds: bool | Verdict, /, **numbers: Any) -> ThesisClaim:
     while "like" in row:
         row = {**tables()["claims"][row.pop("like")], **row}
     values = {k: _Spread(v) if isinstance(v, list | np.ndarray) else v for k, v in numbers.items()}
-    row.pop("reason", None)
     filled: dict[str, Any] = {"of": "ours", **{name: text.format(**values) for name, text in row.items()}}
     if id_ in experiment_sentences() or id_.startswith(CONCLUSION):
         filled["of"] = "experiment"

@@ -88,6 +88,10 @@ class JudgedLaboratory:
         """Number of sentences that hold by their claims' own rules."""
         return sum(s.is_true(self.held[s.id], len(SEEDS)) for s in among)
 
+    def count_runs(self, among: Iterable[Sentence]) -> int:
+        """Number of runs in which a sentence holds, over all of them: the margin between equal counts."""
+        return sum(self.held[s.id] for s in among)
+
 
 @dataclass(frozen=True)
 class SearchResult:
@@ -172,7 +176,7 @@ class LaboratorySearch:
             best = [laboratory_at(point) for point in find_best(state.tried)]
             bench, *judged = [self._judge(state, laboratory) for laboratory in (BENCH, *best)]
             wanted = halves()["calibration" if self.half else "all"]
-            inferred = max(judged, key=lambda lab: lab.count_true(wanted))
+            inferred = max(judged, key=lambda lab: (lab.count_true(wanted), lab.count_runs(wanted)))
             plausible = self._find_plausible(state, inferred)
             sensitivity = self._find_sensitivity(inferred.laboratory)
             result = SearchResult(len(state.tried), bench, inferred, plausible, sensitivity)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import msgspec
 
@@ -49,12 +49,21 @@ class Sentence:
 
 
 class FigureRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A figure in halves.toml; the claims of `besides` enter no search."""
+    """A figure in halves.toml.
 
-    half: str
+    Args:
+        half: "calibration" or "validation".
+        claims: of the figure, besides those of `states` and `besides`.
+        searched: False if no search runs the figure's experiment.
+        besides: claims that enter no search.
+        states: claims that state the value of one unknown, and so calibrate in either half.
+    """
+
+    half: Literal["calibration", "validation"]
     claims: tuple[str, ...]
     searched: bool = True
     besides: tuple[str, ...] = ()
+    states: tuple[str, ...] = ()
 
 
 @cache
@@ -66,13 +75,13 @@ def sentences() -> tuple[Sentence, ...]:
         Sentence(
             claim,
             number,
-            figure.half == "calibration",
+            figure.half == "calibration" or claim in figure.states,
             figure.searched and claim not in figure.besides,
             HOLDS[claim],
             _deciding_fraction(claim),
         )
         for number, figure in figures.items()
-        for claim in (*figure.claims, *figure.besides)
+        for claim in (*figure.states, *figure.claims, *figure.besides)
     )
 
 
