@@ -293,7 +293,7 @@ def test_no_claim_of_the_thesis_is_left_out():
 def test_a_text_is_filled_with_numbers_and_takes_what_it_lacks_from_another():
     first, other = (
         claim(f"least-squares-rubber-settles.{key}", key == "K", key=key, limit=0.05, half=0.005, surface="rubber",
-              times=[1.0, 2.0], others="", edge="", relaxing="", held="", jump=2.0, later=1.0, where="Everywhere.")
+              times=[1.0, 2.0], jump=2.0, later=1.0)
         for key in "KM"
     )  # fmt: skip
     assert first.measured == other.measured == "rubber 1.5 s (1 to 2, 2 seeds)"

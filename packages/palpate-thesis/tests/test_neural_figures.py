@@ -22,7 +22,7 @@ from palpate_thesis.force_control.tracking import (
     tracking,
     variations,
 )
-from palpate_thesis.runs import move_wall, rougher, stops_holding
+from palpate_thesis.runs import move_wall, rougher
 
 TICK = 1e-3
 
@@ -78,8 +78,6 @@ def test_nine_of_ten_are_enough_and_eight_are_not():
     good, bad = Tracking(0.1, 0.1, 0.0, 0.0, 0), Tracking(9.0, 9.0, 0.5, 0.0, 0)
     assert following([good] * 9 + [bad])
     assert not following([good] * 8 + [bad] * 2)
-    told = stops_holding({"a\nb": [good], "c": [bad, good]}, lambda one: one.follows)
-    assert told == "It holds with: a b; it does not with: c (1 of 2 runs)."
 
 
 def test_variations_change_what_they_say_and_nothing_else():

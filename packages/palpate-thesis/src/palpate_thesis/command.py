@@ -69,6 +69,7 @@ def thesis(
     from palpate_thesis.figure import studies, study
     from palpate_thesis.laboratory import describe_laboratory, load_laboratory
     from palpate_thesis.measure import MeasurementFormat
+    from palpate_thesis.printed_facts import count_contradictions
     from palpate_thesis.runs import Runs
 
     if list_:
@@ -86,7 +87,7 @@ def thesis(
     option = f" --laboratory {laboratory}" if name else ""
     command = f"palpate thesis{f' {figure}' if figure else ''}{option} --seeds {seeds}"
     try:
-        about = describe_laboratory(laboratory)
+        about = f"{describe_laboratory(laboratory)} {count_contradictions(values)}"
         written = MeasurementFormat(command, name or "inferred", drawn.endings, drawn.dpi, about)
         _measure(chosen, folder, Runs(range(seeds), laboratory=values), written, replace)
     except KeyboardInterrupt:

@@ -66,7 +66,6 @@ def check(data: Data) -> Sequence[ThesisClaim]:
     first = spread([float(c.error[:2].mean()) for c in data.courses["foam"]], "N")
     plain = spread([float(c.error[-2:].mean()) for c in data.courses["PI, K_i = 1 per second"]], "N")
     lost = [c.lost for c in data.courses["foam that relaxes"] if c.lost is not None]
-    late = np.concatenate([c.error[12:] for c in data.courses["foam"]])
     other = f"loses contact after {np.median(lost):.0f} s" if lost else "keeps contact"
     return [
         claim(
@@ -76,7 +75,6 @@ def check(data: Data) -> Sequence[ThesisClaim]:
             first=first,
             follows=FOLLOWS,
             plain=plain,
-            share=np.mean(late <= LIMIT),
             others=other,
         )
     ]

@@ -64,8 +64,8 @@ def watch(
     return None if march.contact is not None else float("nan")
 
 
-WEIGHT_COLUMNS = {"poses": slice(1, 7), "motor 1's torque": slice(7, 8), "all torques": slice(7, 10)}
-"""Columns of the hidden weights of the 9-12-3 network, by their inputs."""
+FROM_TORQUES = slice(7, 10)
+"""Columns of the hidden weights of the 9-12-3 network from the torques among its inputs."""
 HOLD_INTERVAL = 20
 """Ticks after which weights that are held at zero are set back."""
 
