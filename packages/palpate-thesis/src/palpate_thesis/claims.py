@@ -42,7 +42,6 @@ class ThesisClaim:
         verdict: one of `VERDICTS`.
         note: one paragraph: the reason, the chosen values and their effect, the range of validity.
         of: sentence of the thesis about its experiments; about its set-up or a cited scheme; or ours.
-        group: True if the row only sums up its parts; then it is not counted.
     """
 
     id: str
@@ -54,7 +53,6 @@ class ThesisClaim:
     verdict: Verdict
     note: str
     of: Of = "ours"
-    group: bool = False
 
 
 @dataclass
@@ -186,37 +184,13 @@ def claim(id_: str, holds: bool | Verdict, /, **numbers: Any) -> ThesisClaim:
     return ThesisClaim(id=id_, verdict=holds if isinstance(holds, str) else verdict_of(id_, holds), **filled)
 
 
-def claims_of_studies(studies: Sequence[Done]) -> list[ThesisClaim]:
-    """Claims of the studies with the rows that sum up their parts: see `with_wholes`."""
-    return with_wholes([claim for study in studies for claim in study.claims])
-
-
-def with_wholes(claims: Sequence[ThesisClaim]) -> list[ThesisClaim]:
-    """Insert a row "a" before the first of the parts "a.K", "a.B" of a claim that was measured in parts only.
-
-    Such a row has the last of the verdicts of its parts, in the order of `VERDICTS`, but what cannot be checked
-    decides only where all of its parts are such.
-    """
-    ids = {claim.id for claim in claims}
-    rows: list[ThesisClaim] = []
-    for claim in claims:
-        name = _name(claim)
-        if name not in ids:
-            ids.add(name)
-            rows.append(_whole(name, [c for c in claims if _name(c) == name]))
-        rows.append(claim)
-    return rows
-
-
 def count_verdicts(claims: Sequence[ThesisClaim]) -> dict[str, Counter[str]]:
-    """Number of claims by kind and verdict, without the rows that sum up others; kinds without a claim are left out."""
+    """Number of claims by kind and verdict; kinds without a claim are left out."""
 
     def kind(claim: ThesisClaim) -> str:
         return CONCLUSION if claim.id.startswith(CONCLUSION) else claim.of
 
-    counted = {
-        name: Counter[str](c.verdict for c in claims if kind(c) == name and not c.group) for name in KINDS
-    }
+    counted = {name: Counter[str](c.verdict for c in claims if kind(c) == name) for name in KINDS}
     return {name: counts for name, counts in counted.items() if counts}
 
 
@@ -231,27 +205,3 @@ def count_in_words(claims: Sequence[ThesisClaim]) -> list[str]:
         )
         lines.append(f"{counts.total()} sentence{'s' * (counts.total() != 1)} {KINDS[kind]}: {parts}")
     return lines
-
-
-def _name(claim: ThesisClaim) -> str:
-    """Name of the claim without that of the part: "a" of "a.K"."""
-    return claim.id.partition(".")[0]
-
-
-def _whole(name: str, parts: Sequence[ThesisClaim]) -> ThesisClaim:
-    verdicts = {part.verdict for part in parts}
-    verdict = max(verdicts - {"not checkable"} or verdicts, key=VERDICTS.index)
-    measured = [f"{part.id.rpartition('.')[2]}: {part.verdict}" for part in parts]
-    return ThesisClaim(
-        id=name,
-        source="; ".join(dict.fromkeys(part.source for part in parts)),
-        claim=" ".join(dict.fromkeys(part.claim for part in parts)),
-        thesis="; ".join(dict.fromkeys(part.thesis for part in parts)),
-        measured="; ".join(measured),
-        tolerance="each part by its own threshold",
-        verdict=verdict,
-        note="One sentence of the thesis makes several claims. Each is measured separately: see the rows "
-        f"{', '.join(part.id for part in parts)}.",
-        of=parts[0].of,
-        group=True,
-    )

@@ -103,7 +103,7 @@ def _measure(
     from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 
     from palpate.report.page import Table
-    from palpate_thesis.claims import claims_of_studies, count_in_words, texts
+    from palpate_thesis.claims import count_in_words, texts
     from palpate_thesis.measure import measure
 
     screen = console()
@@ -121,7 +121,7 @@ def _measure(
         done = measure(
             chosen, runs, folder, written=written, replace=replace, started=start_study, resumed=say_resumed
         )
-    claims = claims_of_studies(done)
+    claims = [claim for study in done for claim in study.claims]
     rows = [(claim.id, claim.thesis, claim.measured, claim.verdict) for claim in claims]
     for line in count_in_words(claims):
         screen.print(line)

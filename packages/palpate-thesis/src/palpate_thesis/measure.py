@@ -22,7 +22,6 @@ from palpate_thesis.claims import (
     VERDICTS,
     Done,
     ThesisClaim,
-    claims_of_studies,
     count_in_words,
     experiment_sentences,
     plausible_laboratories,
@@ -184,7 +183,7 @@ def _save_state(state: FolderState, folder: Path) -> None:
 def _write_results(state: FolderState, folder: Path) -> None:
     """Write claims.json, the page and the state, each file whole or as it was."""
     done = [state.done[number] for number in state.wanted if number in state.done]
-    write_json(folder / "claims.json", [asdict(row) for row in claims_of_studies(done)])
+    write_json(folder / "claims.json", [asdict(claim) for study in done for claim in study.claims])
     names = [f"{study.number}{end}" for study in done for end in ("", BESIDE if study.beside else "")]
     pictures = {name: data_address((folder / f"{name}.png").read_bytes(), "image/png") for name in names}
     missing = [number for number in state.wanted if number not in state.done]

@@ -48,6 +48,9 @@ CANDIDATES = 8
 """Best laboratories of the search that are judged over all seeds."""
 PLAUSIBLE = 0.5
 """Least fraction of the sentences that hold in a plausible laboratory: less shows one sentence against all others."""
+PLAUSIBLE_ABOUT = (
+    "Chosen for sentences that do not hold in the inferred one, and within the printed values too."
+)
 ATTEMPTS = 4
 """Tried laboratories that are judged for a sentence that does not hold in the inferred one."""
 VALUES = (0.05, 0.275, 0.5, 0.725, 0.95)
@@ -317,10 +320,13 @@ class LaboratorySearch:
         write_json(self.folder / STATE, with_author(msgspec.to_builtins(state)))
 
     def _write(self, result: SearchResult) -> None:
-        texts = {INFERRED: laboratory_text(result.inferred.laboratory, self._about(result), self.command)}
+        inferred, head = result.inferred.laboratory, {"command": self.command}
+        texts = {INFERRED: laboratory_text(inferred, BENCH, about=self._about(result), **head)}
         for number, (laboratory, ids) in enumerate(result.plausible, 1):
-            about = "Keeps the printed values too; chosen for sentences that do not hold in the inferred one."
-            texts[f"plausible-{number}.toml"] = laboratory_text(laboratory, about, self.command, ids)
+            head["base"] = str(self.folder / INFERRED)
+            texts[f"plausible-{number}.toml"] = laboratory_text(
+                laboratory, inferred, about=PLAUSIBLE_ABOUT, sentences=ids, **head
+            )
         by_unknown = [f"{name} = {json.dumps(ids)}" for name, ids in result.sensitivity.items()]
         texts[SENSITIVITY] = "\n".join(by_unknown) + "\n"
         for name, text in texts.items():
