@@ -178,7 +178,8 @@ def claim(id_: str, holds: bool | Verdict, /, **numbers: Any) -> ThesisClaim:
     while "like" in row:
         row = {**tables()["claims"][row.pop("like")], **row}
     values = {k: _Spread(v) if isinstance(v, list | np.ndarray) else v for k, v in numbers.items()}
-    filled: dict[str, Any] = {"of": "ours", **{name: text.format(**values) for name, text in row.items()}}
+    texts = {name: text.format(**values) for name, text in row.items()}
+    filled: dict[str, Any] = {"of": "ours", "thesis": "in words", **texts}
     if id_ in experiment_sentences() or id_.startswith(CONCLUSION):
         filled["of"] = "experiment"
     return ThesisClaim(id=id_, verdict=holds if isinstance(holds, str) else verdict_of(id_, holds), **filled)

@@ -2,7 +2,7 @@
 
 import hashlib
 import threading
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -141,14 +141,3 @@ def friction_and_pose(experiment: Experiment) -> dict[str, Mapping[str, Any]]:
         "wall at\n0.457 m": move_wall(experiment, NEAREST_WALL),
         "wall at\n0.49 m": move_wall(experiment, 0.49),
     }
-
-
-def by_condition(
-    runs: Runs, worlds: Mapping[str, W], work: Callable[[W, int], T], full: Collection[str]
-) -> dict[str, list[T]]:
-    """`work` of each world and seed, by the world's name: over all seeds in the worlds of `full`, a few in others."""
-    cases = {
-        name: [(world, seed) for seed in runs.seeds[: None if name in full else VARIED_SEEDS]]
-        for name, world in worlds.items()
-    }
-    return runs.map_each(lambda case: work(*case), cases)

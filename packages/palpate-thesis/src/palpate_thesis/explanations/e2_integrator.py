@@ -10,7 +10,7 @@ from palpate.bench import Experiment, with_values
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, spread
-from palpate_thesis.drawing import Axes, Figure, across, limits, panels
+from palpate_thesis.drawing import Axes, Figure, limits, panels
 from palpate_thesis.force_control.tracking import (
     FOAM,
     RUBBER,
@@ -109,7 +109,8 @@ def plot(data: Data) -> Figure:
     style.legend(grid[0][0])
     for axis in grid[1]:
         axis.set_xlabel("time since contact [s]")
-    _gain_panel(across(grid[2]), data.gains)
+    for axis, (name, measured) in zip(grid[2], data.gains.items(), strict=True):
+        _gain_panel(axis, name, measured)
     return drawing
 
 
@@ -123,15 +124,14 @@ def _overlay(axis: Axes, name: str, pair: BothControllers) -> None:
     axis.set(ylabel="force [N]", xlim=JUDGED)
 
 
-def _gain_panel(axis: Axes, gains: Mapping[str, Array]) -> None:
+def _gain_panel(axis: Axes, name: str, measured: Array) -> None:
     axis.plot(RATES, GAINS, color=style.INK, linewidth=1, label="eta (A/2)²/Ts")
-    for (name, measured), color, marker in zip(gains.items(), style.SERIES[:2], "o^", strict=True):
-        ring: Any = {"color": color, "markersize": 6, "fillstyle": "none", "label": name}
-        axis.plot(RATES, np.median(measured, axis=1), marker, **ring)
+    ring: Any = {"color": style.SERIES[0], "markersize": 6, "fillstyle": "none", "label": name}
+    axis.plot(RATES, np.median(measured, axis=1), "o", **ring)
     axis.axvline(RATE, color=style.MEASURED, linewidth=1, linestyle="--", label="the text's")
     axis.axvline(1e-4, color=style.MEASURED, linewidth=1, linestyle=":", label="the listing's")
     axis.set(xscale="log", yscale="log", xlabel="learning rate eta", ylabel="K_i [1/s]")
-    style.legend(axis, ncols=5, columnspacing=0.9, handletextpad=0.4)
+    style.legend(axis, ncols=2)
 
 
 def _pair(runs: Runs, experiment: Experiment) -> BothControllers:

@@ -83,7 +83,9 @@ class LoopParameters(NamedTuple):
 
     def zero_order_hold(self, stiffness: Array) -> tuple[Array, Array, Array]:
         """Tip and analog filter over one tick of constant force: x' = A x + b u for each stiffness, reading c x."""
-        step = _exponential(TICK * self.rates(stiffness))
+        from scipy.linalg import expm
+
+        step = expm(TICK * self.rates(stiffness))
         return step[:, :5, :5], step[:, :5, 5], np.concatenate([[0.0, 0.0], _analog(self.cutoff)[2]])
 
     def rates(self, stiffness: Array) -> Array:
@@ -106,19 +108,6 @@ def _analog(cutoff: float) -> tuple[Array, Array, Array]:
     A, B, C, _ = tf2ss(*butter(3, 1.0, analog=True))
     w = 2.0 * np.pi * cutoff
     return w * A, w * B[:, 0], C[0]
-
-
-def _exponential(A: Array) -> Array:
-    """exp of each matrix, by Taylor's series and squaring; faster than scipy's over many small matrices."""
-    halvings = 12
-    small = A / 2.0**halvings
-    total = term = np.broadcast_to(np.eye(A.shape[-1]), A.shape)
-    for order in range(1, 9):
-        term = term @ small / order
-        total = total + term
-    for _ in range(halvings):
-        total = total @ total
-    return total
 
 
 NUMBER = "4.3"

@@ -1,9 +1,8 @@
 """Experiments of force control, the criterion of following, and varied conditions."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -131,18 +130,24 @@ class Tracked(NamedTuple):
     """Data of a figure of force control."""
 
     shown: Record
-    nominal: list[Any]  # what `ForceStudy.measure` returns, one a seed
+    nominal: list[Any]  # metric of each seed
     varied: dict[str, list[Any]]  # the same by variation
 
 
 @dataclass(frozen=True, eq=False)
-class ForceStudy(ABC):
+class ForceStudy:
     """A figure of the force: an experiment, a metric, a threshold and a panel.
 
     Args:
         NUMBER: of the figure.
         id: of its claim.
         PARAMETERS: experiment, long enough for all windows.
+        measure: metric of a run.
+        agrees: True if a run does what the thesis says.
+        size: number of a run that is drawn beside the limit.
+        label: of that number, with its unit.
+        limit: of that number, beyond which a run does not agree.
+        numbers: values of the placeholders in the claim's texts.
         shown: from when to when after contact the force is drawn [s].
         others: experiments that are measured over all seeds as well, among the variations.
     """
@@ -150,39 +155,25 @@ class ForceStudy(ABC):
     NUMBER: str
     id: str
     PARAMETERS: Experiment
+    measure: Callable[[Record], Any]
+    agrees: Callable[[Any], bool]
+    size: Callable[[Any], float]
+    label: str
+    limit: float
+    numbers: Callable[[Tracked], dict[str, Any]]
     shown: tuple[float, float] = (9.5, 13.5)
     others: Mapping[str, Experiment] = field(default_factory=dict)
-    label: ClassVar[str]
-    limit: ClassVar[float]
-
-    @abstractmethod
-    def measure(self, record: Record) -> Any:
-        """The metric of a run."""
-
-    @abstractmethod
-    def agrees(self, run: Any) -> bool:
-        """True if a run does what the thesis says."""
-
-    @abstractmethod
-    def size(self, run: Any) -> float:
-        """Number of a run that is drawn beside `limit`, under the `label`."""
-
-    @abstractmethod
-    def numbers(self, data: Tracked) -> dict[str, Any]:
-        """Values of the placeholders in the claim's texts."""
 
     def run(self, runs: Runs) -> Any:
         """All seeds, and the variations."""
         nominal = runs.over_seeds(self.PARAMETERS, self.measure)
-        varied = robustness(runs, self.PARAMETERS, nominal, self.measure) | runs.by_name(
-            self.others, self.measure
-        )
-        return Tracked(slot(runs.record(self.PARAMETERS), *self.shown), nominal, varied)
+        varied = robustness(runs, self.PARAMETERS, nominal, self.measure)
+        others = runs.by_name(self.others, self.measure)
+        return Tracked(slot(runs.record(self.PARAMETERS), *self.shown), nominal, varied | others)
 
     def check(self, data: Any) -> list[ThesisClaim]:
         """Does the force do as the thesis says in enough of the runs?"""
-        good = often(map(self.agrees, data.nominal))
-        return [claim(self.id, good, **self.numbers(data))]
+        return [claim(self.id, often(map(self.agrees, data.nominal)), **self.numbers(data))]
 
     def plot(self, data: Any) -> Figure:
         """The force in the slot."""

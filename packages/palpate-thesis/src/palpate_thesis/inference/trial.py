@@ -11,7 +11,6 @@ from palpate_thesis.figures import fig_4_02, fig_4_04, fig_6_06, fig_6_10, fig_6
 from palpate_thesis.figures.fig_6_02_05 import by_ratios
 from palpate_thesis.figures.fig_6_11_17 import (
     FOAM,
-    JUDGED,
     RUBBER,
     RUBBER_SINE,
     SINE,
@@ -131,13 +130,13 @@ def _unbroken(measure: Measure) -> Measure:
 
 
 def _steps_on_foam(record: Record) -> tuple[Tracking, fig_6_15.Errors | None]:
-    return tracking(*JUDGED)(record), _unbroken(fig_6_15.measure_free_errors)(record)
+    return FOAM.measure(record), _unbroken(fig_6_15.measure_free_errors)(record)
 
 
 def _sine_on_rubber(record: Record) -> tuple[Tracking, float]:
     """Tracking, and the time of adapting [s], infinite if contact was lost."""
     adapted = _unbroken(lambda r: adapted_at(away_from_settled(r)))(record)
-    return tracking(*RUBBER_SINE.judged)(record), float("inf") if adapted is None else adapted
+    return RUBBER_SINE.measure(record), float("inf") if adapted is None else adapted
 
 
 MEASURES: Mapping[str, tuple[Experiment, Measure]] = {
@@ -147,10 +146,10 @@ MEASURES: Mapping[str, tuple[Experiment, Measure]] = {
     "hybrid": (HYBRID, _unbroken(fig_6_10.interval_ends)),
     "steps on foam": (FOAM.PARAMETERS, _steps_on_foam),
     "unstuck": (UNSTUCK, _unbroken(fig_6_15.measure_free_errors)),
-    "sine on foam": (SINE.PARAMETERS, tracking(*JUDGED)),
-    "slow, first": (SLOW.PARAMETERS, tracking(*SLOW.judged)),
+    "sine on foam": (SINE.PARAMETERS, SINE.measure),
+    "slow, first": (SLOW.PARAMETERS, SLOW.measure),
     "slow, later": (fig_6_14.PARAMETERS, tracking(*fig_6_14.JUDGED)),
-    "steps on rubber": (RUBBER.PARAMETERS, tracking(*JUDGED)),
+    "steps on rubber": (RUBBER.PARAMETERS, RUBBER.measure),
     "sine on rubber": (RUBBER_SINE.PARAMETERS, _sine_on_rubber),
 }
 """Experiments by name, and the function that measures each; "slow, later" takes as long as all others together."""
