@@ -125,11 +125,6 @@ def spread(values: Sequence[float], unit: str = "", digits: int = 3) -> str:
     return f"{middle}{suffix} ({low} to {high}, {len(v)} seeds{missing})"
 
 
-def on_one_line(name: str) -> str:
-    """Name of a variation without its line breaks."""
-    return name.replace("\n", " ")
-
-
 class _Spread(list[Any]):
     """Values over the seeds, for a placeholder in a text: "{error:N 2}" is their spread in newtons, to two digits.
 

@@ -13,12 +13,10 @@ from palpate_thesis.claims import ThesisClaim, claim
 from palpate_thesis.drawing import LIMIT_LINE, Axes, Figure, legend_inside, panels
 from palpate_thesis.explanations.e2_integrator import PI
 from palpate_thesis.force_control.interventions import (
-    FROM_TORQUES,
     HOLD_INTERVAL,
-    WeightsAtMoment,
-    hold,
     layers,
     watch,
+    without_torques,
 )
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, since_contact
 from palpate_thesis.runs import RELAXING_FOAM, Runs, rougher
@@ -150,7 +148,7 @@ def run(runs: Runs) -> Data:
     plain = _losses(runs, {name: with_values(e, PI) for name, e in PARAMETERS.items()})
     causes = _losses(runs, {name: with_values(RELAXING, change) for name, change in CAUSES.items()})
     causes[WITHOUT_TORQUES] = [
-        watch(RELAXING, runs.seeds[0], DURATION, hold(FROM_TORQUES), runs.waiting, HOLD_INTERVAL)
+        watch(RELAXING, runs.seeds[0], DURATION, without_torques, runs.waiting, HOLD_INTERVAL)
     ]
     return Data(courses, plain, causes, _loss(runs, courses["foam that relaxes"][5e-5][0].lost))
 
@@ -205,9 +203,9 @@ def plot(data: Data) -> Figure:
 def _course(runs: Runs, experiment: Experiment, seed: int) -> LongRun:
     rows: list[tuple[Any, ...]] = []
 
-    def look(moment: WeightsAtMoment) -> None:
-        assert moment.neural is not None
-        rows.append((moment.t, weight_norms(moment.neural), torque_gains(moment.neural)))
+    def look(t: float, state: NeuralState | None) -> None:
+        assert state is not None
+        rows.append((t, weight_norms(state), torque_gains(state)))
 
     lost = watch(experiment, seed, DURATION, look, runs.waiting)
     t, sizes, gains = map(np.array, zip(*rows, strict=True))
@@ -232,7 +230,7 @@ def torque_gains(state: NeuralState) -> Array:
 def _losses(runs: Runs, experiments: Mapping[str, Experiment]) -> dict[str, list[float | None]]:
     """Time at which each loses contact with the first seed [s]."""
     return runs.map_each(
-        lambda e: watch(e, runs.seeds[0], DURATION, lambda _: None, runs.waiting),
+        lambda e: watch(e, runs.seeds[0], DURATION, lambda _, __: None, runs.waiting),
         {name: [e] for name, e in experiments.items()},
     )
 

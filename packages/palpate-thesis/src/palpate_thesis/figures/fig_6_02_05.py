@@ -10,10 +10,8 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.bench import Experiment
 from palpate.records import Record
-from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, spread
-from palpate_thesis.drawing import STATED, ZERO, Axes, Figure
-from palpate_thesis.drawing import panels as rows_of_panels
+from palpate_thesis.drawing import STATED, ZERO, Figure
 from palpate_thesis.least_squares import panels, press_runs
 from palpate_thesis.least_squares.press_runs import PressEstimates, median
 from palpate_thesis.runs import Runs
@@ -117,23 +115,6 @@ def _ratio_claim(data: Data, id_: str) -> ThesisClaim:
     )
 
 
-def _ratios(axis: Axes, data: Data) -> None:
-    axis.set_title(f"Ratios of single samples (bars: 8 of 10), {data.surface}")
-    for i, key in enumerate("KBM"):
-        low, middle, high = np.median(data.ratios[key], axis=0) / data.truth[key]
-        axis.plot([low, high], [i, i], color=style.MEASURED, linewidth=6, solid_capstyle="butt")
-        labels = (None, None) if i else ("ratios, middle", "least squares")
-        axis.plot(middle, i, "|", color=style.INK, markersize=13, label=labels[0])
-        fit = median([getattr(f, key) for f in data.presses]) / data.truth[key]
-        axis.plot(fit, i, "o", color=style.SERIES[0], label=labels[1])
-    axis.axvline(1.0, **style.KNOWN, label="true")
-    axis.set_xscale("symlog", linthresh=2.0)
-    axis.set_yticks(range(3), ["K", "B", "M"])
-    axis.set_ylim(2.6, -0.6)
-    axis.set_xlabel("share of the true value")
-    axis.legend(loc="upper left")
-
-
 def plausible(press: PressEstimates) -> bool:
     """True if B_e is near the surface's own B."""
     return abs(press.B / press.true_B - 1.0) < PLAUSIBLE
@@ -192,12 +173,6 @@ class Later:
         for axis, key in ((axes[1], "M"), (axes[3], "B")):
             panels.calm_limits(axis, np.zeros(1), press[f"{key}_thesis"][inside])
             axis.axhline(0.0, **ZERO)
-        return drawing
-
-    def beside(self, data: Data) -> Figure:
-        """Estimates from single samples by the ratios of section 5.1."""
-        drawing, ((axis,),) = rows_of_panels([2.4])
-        _ratios(axis, data)
         return drawing
 
 

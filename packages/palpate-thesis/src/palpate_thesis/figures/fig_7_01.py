@@ -218,7 +218,7 @@ def plot(data: Data) -> Figure:
             _coefficient(grid[row][column], c, key)
         grid[0][column].set_title(surface)
         _force(grid[3][column], data.force, surface)
-    for axis in (grid[0][0], grid[3][0]):
+    for axis in (grid[1][0], grid[3][0]):
         style.legend(axis)
     return drawing
 

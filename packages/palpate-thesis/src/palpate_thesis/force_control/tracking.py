@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,6 @@ from palpate.studies.metrics.window import SETTLE, rms
 from palpate_thesis.claims import ThesisClaim, claim, often, spread
 from palpate_thesis.drawing import Figure, force_figure, panels, strip
 from palpate_thesis.runs import RELAXING_FOAM, SHORT, VARIED_SEEDS, Runs, friction_and_pose
-
-T = TypeVar("T")
 
 FOLLOWING = (
     f"no loss of contact; RMS of the true force's error at most {LIMIT:g} N (10 % of the mean desired force) "
@@ -100,30 +98,12 @@ def slot(record: Record, start: float = 0.0, end: float = np.inf) -> Record:
     return Record({**columns, "t": t[rows]}, record.units, record.meta)
 
 
-def variations(experiment: Experiment, seed: int) -> dict[str, Experiment]:
-    """The experiment with other friction, poses, foam and weights, and with values of the listing."""
-    e = experiment
-    by = friction_and_pose(e)
-    if e.surface == FOAM.surface:
+def variations(experiment: Experiment) -> dict[str, Experiment]:
+    """The experiment with other friction and poses, and with a foam that relaxes in place of foam."""
+    by = friction_and_pose(experiment)
+    if experiment.surface == FOAM.surface:
         by["relaxing\nfoam"] = RELAXING_FOAM
-    if e.controller.__class__ is FOAM.controller.__class__:
-        by["random\nweights"] = {"controller.weights": "random", "controller.weights_seed": seed}
-        by["rate of\nthe listing"] = {"controller.learning_rate": 1e-4}
-    if e.force.restart > 0.0:
-        by["clock\nruns on"] = {"force.restart": 0.0}
-        by["motor 2\nto 4 N m"] = {"robot.torque_limits": (16.0, 4.0, 0.6)}
-    return {name: with_values(e, changes) for name, changes in by.items()}
-
-
-def robustness(
-    runs: Runs, experiment: Experiment, nominal: Sequence[T], measure: Callable[[Record], T]
-) -> dict[str, list[T]]:
-    """`measure` of each run by variation, the nominal case first."""
-    cases: dict[str, list[tuple[Experiment, int]]] = {}
-    for seed in runs.seeds[:VARIED_SEEDS]:
-        for name, e in variations(experiment, seed).items():
-            cases.setdefault(name, []).append((e, seed))
-    return {"as\nchosen": list(nominal), **runs.map_each(lambda case: measure(runs.record(*case)), cases)}
+    return {name: with_values(experiment, changes) for name, changes in by.items()}
 
 
 class Tracked(NamedTuple):
@@ -167,9 +147,10 @@ class ForceStudy:
     def run(self, runs: Runs) -> Any:
         """All seeds, and the variations."""
         nominal = runs.over_seeds(self.PARAMETERS, self.measure)
-        varied = robustness(runs, self.PARAMETERS, nominal, self.measure)
+        varied = runs.by_name(variations(self.PARAMETERS), self.measure, VARIED_SEEDS)
         others = runs.by_name(self.others, self.measure)
-        return Tracked(slot(runs.record(self.PARAMETERS), *self.shown), nominal, varied | others)
+        shown = slot(runs.record(self.PARAMETERS), *self.shown)
+        return Tracked(shown, nominal, {"as\nchosen": nominal, **varied, **others})
 
     def check(self, data: Any) -> list[ThesisClaim]:
         """Does the force do as the thesis says in enough of the runs?"""

@@ -117,17 +117,36 @@ def starts(runs: Runs) -> tuple[int, ...]:
     return STARTS if runs.laboratory.start is None else (int(runs.laboratory.start),)
 
 
-class NetworkAnswer(NamedTuple):
-    """Answer of one network after one press: averages over the last half second."""
+class Coefficients(NamedTuple):
+    """K, B and M of a method along a press: means over the last half second, and settling times."""
 
-    K: float
+    K: float  # [N/m]
+    B: float  # [N s/m]
+    M: float  # [kg]
+    settled_K: float  # time from which it stays within 10 % of its last value [s]
+    settled_B: float
+    settled_M: float  # within 10 % of its largest value: see `mass_settled_after`
+
+
+def coefficients(curve: Array) -> Coefficients:
+    """Values and settling times of K, B, M along a press, shape (n, 3)."""
+    end = len(curve) * TICK
+    settled = [press_runs.settled_after(values, end) for values in curve.T[:2]]
+    K, B, M = map(float, curve[-round(LATE / TICK) :].mean(axis=0))
+    return Coefficients(K, B, M, *settled, press_runs.mass_settled_after(curve[:, 2], end))
+
+
+class NetworkAnswer(NamedTuple):
+    """Answer of one network after one press."""
+
+    K: float  # these six as in `Coefficients`
     B: float
     M: float
-    ratio: float  # f/x of the press [N/m]
-    squares_B: float  # least squares' B of the same press [N s/m]
-    settled_K: float  # from when on within 10 % of the value at 4 s [s]
+    settled_K: float
     settled_B: float
     settled_M: float
+    ratio: float  # f/x of the press [N/m]
+    squares_B: float  # least squares' B of the same press [N s/m]
     error_gone: float  # from when on the mean error of the output is within GONE [s]; infinite: never
 
     @property
@@ -138,14 +157,9 @@ class NetworkAnswer(NamedTuple):
 
 def answer(press: NetworkPress, choice: NetworkChoice, start: int) -> NetworkAnswer:
     """Lets one network learn from one press."""
-    _, answers = learn(press, choice, start)
-    K, B, M = map(float, answers[-round(LATE / TICK) :, :3].mean(axis=0))
-    end = len(answers) * TICK
-    k, b = (press_runs.settled_after(a, end) for a in answers[:, :2].T)
-    m = press_runs.mass_settled_after(answers[:, 2], end)
-    return NetworkAnswer(
-        K, B, M, press.ratio, float(press.squares[-1, 1]), k, b, m, error_gone(answers[:, 3])
-    )
+    _, curve = learn(press, choice, start)
+    gone, squares_B = error_gone(curve[:, 3]), float(press.squares[-1, 1])
+    return NetworkAnswer(*coefficients(curve[:, :3]), press.ratio, squares_B, gone)
 
 
 def tangent(probe: NeuralProbe, x: float) -> float:
