@@ -57,7 +57,9 @@ def test_every_unknown_is_a_field_with_a_range_that_holds_its_own_ends():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("sentence", "name"), sorted(plausible_laboratories().items()))
+@pytest.mark.parametrize(
+    ("sentence", "name"), [(s, n) for s, n in sorted(plausible_laboratories().items()) if s in HOLDS]
+)
 def test_a_plausible_laboratory_shows_the_sentence_that_it_was_chosen_for(sentence: str, name: str):
     (wanted,) = (s for s in sentences() if s.id == sentence)
     trials = [Trial(load_laboratory(name), seed, search.FULL_STEPS) for seed in search.SEEDS]
