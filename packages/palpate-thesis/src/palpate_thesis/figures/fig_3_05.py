@@ -76,7 +76,7 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 
 
 def plot(data: Data) -> Figure:
-    """Both spectra."""
+    """Both spectra over the frequency."""
     drawing, (axis,) = style.figure(1, height=3.4)
     shown = FREQUENCY > 0.0
     for power, color, label in (

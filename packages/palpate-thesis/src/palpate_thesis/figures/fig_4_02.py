@@ -11,9 +11,8 @@ from palpate.bench.summary import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim
-from palpate_thesis.drawing import STATED, Axes, Figure
+from palpate_thesis.drawing import STATED, Figure, panels
 from palpate_thesis.least_squares import press_runs
-from palpate_thesis.least_squares.panels import set_title
 from palpate_thesis.runs import Runs
 
 NUMBER = "4.2"
@@ -107,15 +106,8 @@ def _false(switches: Sequence[Switch]) -> float:
 
 
 def plot(data: Data) -> Figure:
-    """The force around the switch; below, the thresholds."""
-    drawing, (upper, lower) = style.grid((9.0, 5.9), 2, height_ratios=(1.5, 1.0))
-    _force(upper, data)
-    _thresholds(lower, data)
-    return drawing
-
-
-def _force(axis: Axes, data: Data) -> None:
-    set_title(axis, "a", "Force through the switch")
+    """The force around the switch."""
+    drawing, ((axis,),) = panels([3.4])
     for name, (t, force) in data.shown.items():
         axis.plot(t, force, linewidth=1.0, label=name)
     axis.plot([0.0, AFTER], [DESIRED, DESIRED], **style.KNOWN, label="desired")
@@ -125,20 +117,4 @@ def _force(axis: Axes, data: Data) -> None:
     axis.axhline(CHOSEN, **STATED)
     axis.set(xlabel="time since 5 N [s]", ylabel="force [N]", xlim=(-BEFORE, AFTER), ylim=(-2.5, 25.0))
     style.legend(axis)
-
-
-def _thresholds(axis: Axes, data: Data) -> None:
-    set_title(axis, "b", "Thresholds, foam; above: share of the runs that noise switched in free motion")
-    for f, switches in data.by_threshold.items():
-        axis.plot(
-            np.full(len(switches), f),
-            [s.true_force for s in switches],
-            "o",
-            color=style.SERIES[0],
-            markersize=3.5,
-        )
-        axis.annotate(f"{100 * _false(switches):.0f} %", (f, 5.6), ha="center", color=style.FAIL)
-    axis.plot([0.0, 5.5], [0.0, 5.5], color=style.MEASURED, linewidth=0.9, linestyle="--")
-    axis.set(
-        xlabel="threshold of the measured force [N]", ylabel="true force at the switch [N]", ylim=(-0.5, 6.3)
-    )
+    return drawing

@@ -102,22 +102,22 @@ def _deciding_fraction(claim: str) -> float | None:
     return None if claim.startswith(by_majority) or claim.endswith((".adapts", ".sticks")) else ENOUGH
 
 
-def _of(name: str, holds: Callable[[Any], bool]) -> Holds:
+def _when_kept(name: str, holds: Callable[[Any], bool]) -> Holds:
     """True if contact was kept in an experiment of `trial.MEASURES`, and `holds` of its result."""
     return lambda t: t[name] is not None and holds(t[name])
 
 
 def _foam(holds: Callable[[WatchedPress], bool]) -> Holds:
-    return _of("foam", holds)
+    return _when_kept("foam", holds)
 
 
 def _rubber(holds: Callable[[WatchedPress], bool]) -> Holds:
-    return _of("rubber", holds)
+    return _when_kept("rubber", holds)
 
 
 def _settling(figure: first_seconds.LeastSquaresFirstSeconds) -> dict[str, Holds]:
     def settles(key: str) -> Holds:
-        return _of(figure.surface, lambda p: first_seconds.settles(p.estimates, key, figure.limit))
+        return _when_kept(figure.surface, lambda p: first_seconds.settles(p.estimates, key, figure.limit))
 
     return {f"{figure.claim}.{key}": settles(key) for key in "KBM"}
 
@@ -126,11 +126,11 @@ def _later(figure: later.Later) -> dict[str, Holds]:
     """The sentences of figure 6.2 or 6.5."""
     name, kilo = figure.surface, 1e3 * figure.printed[0]
     return {
-        figure.claim: _of(name, lambda p: figure.near(p.estimates)),
-        f"{figure.claim}.K": _of(name, lambda p: abs(p.estimates.K / kilo - 1.0) < later.LEVEL),
-        f"{figure.claim}.B": _of(name, lambda p: later.plausible(p.estimates)),
-        f"{figure.claim}.M": _of(name, lambda p: p.estimates.M < 0.0),
-        figure.ratio: _of(name, lambda p: p.spread > 1.0),
+        figure.claim: _when_kept(name, lambda p: figure.near(p.estimates)),
+        f"{figure.claim}.K": _when_kept(name, lambda p: abs(p.estimates.K / kilo - 1.0) < later.LEVEL),
+        f"{figure.claim}.B": _when_kept(name, lambda p: later.plausible(p.estimates)),
+        f"{figure.claim}.M": _when_kept(name, lambda p: p.estimates.M < 0.0),
+        figure.ratio: _when_kept(name, lambda p: p.spread > 1.0),
     }
 
 
@@ -158,7 +158,7 @@ def _sticks(trial: Trial) -> bool:
 
 
 def _free_directions(holds: Callable[[fig_6_15.Errors], bool]) -> Holds:
-    return _of("steps on foam", lambda result: result[1] is not None and holds(result[1]))
+    return _when_kept("steps on foam", lambda result: result[1] is not None and holds(result[1]))
 
 
 HOLDS: Mapping[str, Holds] = {
@@ -177,7 +177,7 @@ HOLDS: Mapping[str, Holds] = {
     "network-learning-rate.too-large": _too_large,
     **_network("foam", (*network_claims.FOAM, network_claims.ERROR)),
     **_network("rubber", network_claims.RUBBER),
-    "hybrid-alone-falls-short": _of("hybrid", fig_6_10.misses),
+    "hybrid-alone-falls-short": _when_kept("hybrid", fig_6_10.misses),
     "neural-foam-steps": lambda t: t["steps on foam"][0].follows,
     "neural-foam-sine": lambda t: t["sine on foam"].follows,
     "neural-slow-rate.first": lambda t: not t["slow, first"].follows,

@@ -131,9 +131,9 @@ class Coefficients(NamedTuple):
 def coefficients(curve: Array) -> Coefficients:
     """Values and settling times of K, B, M along a press, shape (n, 3)."""
     end = len(curve) * TICK
-    settled = [press_runs.settled_after(values, end) for values in curve.T[:2]]
+    k, b = (press_runs.settled_after(values, end) for values in curve.T[:2])
     K, B, M = map(float, curve[-round(LATE / TICK) :].mean(axis=0))
-    return Coefficients(K, B, M, *settled, press_runs.mass_settled_after(curve[:, 2], end))
+    return Coefficients(K, B, M, k, b, press_runs.mass_settled_after(curve[:, 2], end))
 
 
 class NetworkAnswer(NamedTuple):
