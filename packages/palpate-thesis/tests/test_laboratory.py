@@ -57,13 +57,14 @@ def test_every_unknown_is_a_field_with_a_range_that_holds_its_own_ends():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("sentence", "name"), [(s, n) for s, n in sorted(plausible_laboratories().items()) if s in HOLDS]
-)
-def test_a_plausible_laboratory_shows_the_sentence_that_it_was_chosen_for(sentence: str, name: str):
-    (wanted,) = (s for s in sentences() if s.id == sentence)
+@pytest.mark.parametrize("name", sorted(set(plausible_laboratories().values()) - {"inferred"}))
+def test_a_laboratory_shows_the_sentences_that_it_is_named_for(name: str):
+    named = {s for s, laboratory in plausible_laboratories().items() if laboratory == name}
     trials = [Trial(load_laboratory(name), seed, search.FULL_STEPS) for seed in search.SEEDS]
-    assert wanted.is_true(sum(map(wanted.holds, trials)), len(trials))
+    wrong = [
+        s.id for s in sentences() if s.id in named and not s.is_true(sum(map(s.holds, trials)), len(trials))
+    ]
+    assert wrong == []
 
 
 @pytest.mark.parametrize("experiment", [FOAM, RUBBER, press_runs.PLAIN, press_runs.RELAXING])
@@ -263,10 +264,10 @@ def test_a_figure_is_measured_in_another_laboratory(tmp_path):
         [study("4.4")], runs, tmp_path / "thesis", written=MeasurementFormat("palpate thesis 4.4")
     )
     (claim,) = done.claims
-    assert claim.verdict == "contradicted"
-    assert "noise" in claim.note
+    assert claim.verdict == "reproduced in a plausible laboratory"
+    assert "It holds with --laboratory inferred" in claim.note
     page = (tmp_path / "thesis" / "index.html").read_text()
-    assert "1 sentence about the experiments: 0 reproduced, 1 contradicted" in page
+    assert "1 sentence about the experiments: 0 reproduced, 1 reproduced in a plausible" in page
 
 
 def row(name: str, verdict, of="ours") -> ThesisClaim:

@@ -89,7 +89,7 @@ def verdict_of(id_: str, holds: bool) -> Verdict:
 
 @cache
 def plausible_laboratories() -> Mapping[str, str]:
-    """Name of the laboratory that was chosen for a sentence, by the sentence; see `sentences` in its file."""
+    """Name of a laboratory in which a sentence holds, by the sentence; see `sentences` in its file."""
     folder = resources.files("palpate_thesis") / "laboratories"
     files = {f.name.removesuffix(".toml"): tomllib.loads(f.read_text("utf-8")) for f in folder.iterdir()}
     return {id_: name for name, file in sorted(files.items()) for id_ in file.get("sentences", ())}

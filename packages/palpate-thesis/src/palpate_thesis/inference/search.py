@@ -321,7 +321,9 @@ class LaboratorySearch:
 
     def _write(self, result: SearchResult) -> None:
         inferred, head = result.inferred.laboratory, {"command": self.command}
-        texts = {INFERRED: laboratory_text(inferred, BENCH, about=self._about(result), **head)}
+        true = [s.id for s in sentences() if result.inferred.count_true([s]) and not self.half]
+        text = laboratory_text(inferred, BENCH, about=self._about(result), sentences=true, **head)
+        texts = {INFERRED: text}
         for number, (laboratory, ids) in enumerate(result.plausible, 1):
             head["base"] = str(self.folder / INFERRED)
             texts[f"plausible-{number}.toml"] = laboratory_text(
