@@ -176,8 +176,10 @@ class LaboratorySearch:
             while len(state.tried) < self.tries:
                 state.tried += self._try_generation(self.propose(state.tried), len(state.tried))
                 self._save(state)
-            best = [laboratory_at(point) for point in find_best(state.tried)]
-            bench, *judged = [self._judge(state, laboratory) for laboratory in (BENCH, *best)]
+            bench, *judged = [
+                JudgedLaboratory(laboratory, self._count_seeds(state, laboratory, sentences()))
+                for laboratory in (BENCH, *map(laboratory_at, find_best(state.tried)))
+            ]
             wanted = halves()["calibration" if self.half else "all"]
             inferred = max(judged, key=lambda lab: (lab.count_true(wanted), lab.count_runs(wanted)))
             plausible = self._find_plausible(state, inferred)
@@ -226,9 +228,6 @@ class LaboratorySearch:
         finally:
             stop.set()
         return [results[number] for number in sorted(results)]
-
-    def _judge(self, state: SearchState, laboratory: Laboratory) -> JudgedLaboratory:
-        return JudgedLaboratory(laboratory, self._count_seeds(state, laboratory, sentences()))
 
     def _find_plausible(
         self, state: SearchState, inferred: JudgedLaboratory

@@ -107,7 +107,6 @@ def conditions(experiment: Experiment) -> dict[str, Experiment]:
         "wall at 0.49 m": move_wall(experiment, 0.49),
         "B halved": {"surface.damping": 0.5 * surface.damping},
         "B doubled": {"surface.damping": 2.0 * surface.damping},
-        "M = 0": {"surface.mass": 0.0},
         "M = 0.5 kg": {"surface.mass": 0.5},
     }
     return {name: with_values(experiment, changes) for name, changes in by.items()}
