@@ -29,6 +29,7 @@ demo: .venv/run.stamp ## set up, identify a small log, press on foam, and say wh
 	$(BIN)/palpate identify examples/data/press.csv --time time_s --position position_mm:mm --force force_N:N --figure runs/press.png
 	$(BIN)/palpate run foam-hybrid --out $(OUT) --replace
 	@echo "The report is $(CURDIR)/$(OUT)/report.html"
+	@echo "The press of the thesis that this began with: $(BIN)/palpate thesis 6.12"
 
 test: .venv/dev.stamp ## set up and run the tests, on all cores
 	$(SHARED)

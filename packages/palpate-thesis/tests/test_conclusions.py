@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from palpate.bench import with_values
+from palpate_thesis.claims import plausible_laboratories
 from palpate_thesis.figures import fig_7_01
 from palpate_thesis.force_control import gain_sets
-from palpate_thesis.force_control.tracking import Tracking
+from palpate_thesis.force_control.tracking import Tracking, tracking
+from palpate_thesis.laboratory import load_laboratory
 from palpate_thesis.neural_identifier import side_by_side
 from palpate_thesis.neural_identifier.network import NetworkPress
 from palpate_thesis.neural_identifier.side_by_side import Identified, Pair, SharedPress
@@ -66,3 +69,20 @@ def test_gains_are_tuned_by_the_least_error_of_a_run_that_kept_contact():
     }
     assert gain_sets.best_gains(errors)[2] == "mid"
     assert gain_sets.TUNING_SEED not in Runs(range(1000)).seeds
+
+
+@pytest.mark.long
+def test_a_plausible_laboratory_shows_why_hybrid_gains_have_to_be_changed():
+    """On a rubber of little damping the foam's gains fail, on foam the rubber's; the network follows on both."""
+    laboratory = load_laboratory(plausible_laboratories()["conclusion-gains.hybrid"])
+    experiments = {
+        (name, surface): with_values(e, changes)
+        for name, (changes, _) in gain_sets.ONE_SET.items()
+        for surface, e in gain_sets.SURFACES.items()
+    }
+    results = Runs(range(2), laboratory=laboratory).by_name(experiments, tracking(*gain_sets.JUDGED))
+    follow = {key: all(run.follows for run in runs) for key, runs in results.items()}
+    assert {key for key, good in follow.items() if not good} == {
+        ("hybrid, foam's gains", "rubber"),
+        ("hybrid, rubber's gains", "foam"),
+    }

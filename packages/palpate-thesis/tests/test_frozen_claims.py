@@ -7,7 +7,7 @@ import pytest
 
 from frozen import FEW, differences, kept, runs_of, told
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, spread
+from palpate_thesis.claims import ThesisClaim, plausible_laboratories, spread
 from palpate_thesis.figure import studies, study
 
 FROZEN, OF_TWO_SEEDS = kept(), kept(FEW)
@@ -31,6 +31,13 @@ def changes(measured=ONE.measured, verdict="reproduced"):
 def test_every_study_is_kept():
     assert list(FROZEN) == [one.NUMBER for one in studies()]
     assert all(claims.keys() == FROZEN[number].keys() for number, claims in OF_TWO_SEEDS.items())
+
+
+def test_the_inferred_laboratory_is_named_for_sentences_that_hold_there():
+    named = {sentence for sentence, name in plausible_laboratories().items() if name == "inferred"}
+    verdicts = {id_: text for claims in FROZEN.values() for id_, text in claims.items()}
+    assert len(named) == 41
+    assert all(verdicts[id_].startswith("reproduced:") for id_ in named)
 
 
 def test_a_median_may_move_within_the_range_and_nothing_else_may():
@@ -57,6 +64,6 @@ def test_a_study_comes_to_what_it_came_to(number, tmp_path):
     claims = one.check(data)
     assert list(differences((OF_TWO_SEEDS if few else FROZEN)[number], claims)) == []
     for claim in claims:
-        assert all(text for name, text in claim.__dict__.items() if name != "group")
+        assert all(claim.__dict__.values())
         assert not re.search(r"\b(nan|inf)\b", f"{claim.measured} {claim.note}")
     assert style.save(one.plot(data), tmp_path / "figure.png").stat().st_size > 10_000

@@ -42,7 +42,6 @@ class ThesisClaim:
         verdict: one of `VERDICTS`.
         note: one paragraph: the reason, the chosen values and their effect, the range of validity.
         of: sentence of the thesis about its experiments; about its set-up or a cited scheme; or ours.
-        group: True if the row only sums up its parts; then it is not counted.
     """
 
     id: str
@@ -54,7 +53,6 @@ class ThesisClaim:
     verdict: Verdict
     note: str
     of: Of = "ours"
-    group: bool = False
 
 
 @dataclass
@@ -91,7 +89,7 @@ def verdict_of(id_: str, holds: bool) -> Verdict:
 
 @cache
 def plausible_laboratories() -> Mapping[str, str]:
-    """Name of the laboratory that was chosen for a sentence, by the sentence; see `sentences` in its file."""
+    """Name of a laboratory in which a sentence holds, by the sentence; see `sentences` in its file."""
     folder = resources.files("palpate_thesis") / "laboratories"
     files = {f.name.removesuffix(".toml"): tomllib.loads(f.read_text("utf-8")) for f in folder.iterdir()}
     return {id_: name for name, file in sorted(files.items()) for id_ in file.get("sentences", ())}
@@ -102,7 +100,11 @@ def experiment_sentences() -> frozenset[str]:
     """Names of the sentences of the thesis about its experiments: those of halves.toml."""
     text = (resources.files("palpate_thesis") / "inference" / "halves.toml").read_text("utf-8")
     figures = tomllib.loads(text).values()
-    return frozenset(id_ for figure in figures for id_ in (*figure["claims"], *figure.get("besides", ())))
+    return frozenset(
+        id_
+        for figure in figures
+        for id_ in (*figure.get("states", ()), *figure["claims"], *figure.get("besides", ()))
+    )
 
 
 def often(holds: Iterable[bool]) -> bool:
@@ -121,11 +123,6 @@ def spread(values: Sequence[float], unit: str = "", digits: int = 3) -> str:
     missing = f", {len(v) - len(finite)} without a value" if len(finite) < len(v) else ""
     low, middle, high = (f"{x:.{digits}g}" for x in (finite.min(), np.median(finite), finite.max()))
     return f"{middle}{suffix} ({low} to {high}, {len(v)} seeds{missing})"
-
-
-def on_one_line(name: str) -> str:
-    """Name of a variation without its line breaks."""
-    return name.replace("\n", " ")
 
 
 class _Spread(list[Any]):
@@ -176,44 +173,20 @@ def claim(id_: str, holds: bool | Verdict, /, **numbers: Any) -> ThesisClaim:
     while "like" in row:
         row = {**tables()["claims"][row.pop("like")], **row}
     values = {k: _Spread(v) if isinstance(v, list | np.ndarray) else v for k, v in numbers.items()}
-    row.pop("reason", None)
-    filled: dict[str, Any] = {"of": "ours", **{name: text.format(**values) for name, text in row.items()}}
+    texts = {name: text.format(**values) for name, text in row.items()}
+    filled: dict[str, Any] = {"of": "ours", "thesis": "in words", **texts}
     if id_ in experiment_sentences() or id_.startswith(CONCLUSION):
         filled["of"] = "experiment"
     return ThesisClaim(id=id_, verdict=holds if isinstance(holds, str) else verdict_of(id_, holds), **filled)
 
 
-def claims_of_studies(studies: Sequence[Done]) -> list[ThesisClaim]:
-    """Claims of the studies with the rows that sum up their parts: see `with_wholes`."""
-    return with_wholes([claim for study in studies for claim in study.claims])
-
-
-def with_wholes(claims: Sequence[ThesisClaim]) -> list[ThesisClaim]:
-    """Insert a row "a" before the first of the parts "a.K", "a.B" of a claim that was measured in parts only.
-
-    Such a row has the last of the verdicts of its parts, in the order of `VERDICTS`, but what cannot be checked
-    decides only where all of its parts are such.
-    """
-    ids = {claim.id for claim in claims}
-    rows: list[ThesisClaim] = []
-    for claim in claims:
-        name = _name(claim)
-        if name not in ids:
-            ids.add(name)
-            rows.append(_whole(name, [c for c in claims if _name(c) == name]))
-        rows.append(claim)
-    return rows
-
-
 def count_verdicts(claims: Sequence[ThesisClaim]) -> dict[str, Counter[str]]:
-    """Number of claims by kind and verdict, without the rows that sum up others; kinds without a claim are left out."""
+    """Number of claims by kind and verdict; kinds without a claim are left out."""
 
     def kind(claim: ThesisClaim) -> str:
         return CONCLUSION if claim.id.startswith(CONCLUSION) else claim.of
 
-    counted = {
-        name: Counter[str](c.verdict for c in claims if kind(c) == name and not c.group) for name in KINDS
-    }
+    counted = {name: Counter[str](c.verdict for c in claims if kind(c) == name) for name in KINDS}
     return {name: counts for name, counts in counted.items() if counts}
 
 
@@ -228,27 +201,3 @@ def count_in_words(claims: Sequence[ThesisClaim]) -> list[str]:
         )
         lines.append(f"{counts.total()} sentence{'s' * (counts.total() != 1)} {KINDS[kind]}: {parts}")
     return lines
-
-
-def _name(claim: ThesisClaim) -> str:
-    """Name of the claim without that of the part: "a" of "a.K"."""
-    return claim.id.partition(".")[0]
-
-
-def _whole(name: str, parts: Sequence[ThesisClaim]) -> ThesisClaim:
-    verdicts = {part.verdict for part in parts}
-    verdict = max(verdicts - {"not checkable"} or verdicts, key=VERDICTS.index)
-    measured = [f"{part.id.rpartition('.')[2]}: {part.verdict}" for part in parts]
-    return ThesisClaim(
-        id=name,
-        source="; ".join(dict.fromkeys(part.source for part in parts)),
-        claim=" ".join(dict.fromkeys(part.claim for part in parts)),
-        thesis="; ".join(dict.fromkeys(part.thesis for part in parts)),
-        measured="; ".join(measured),
-        tolerance="each part by its own threshold",
-        verdict=verdict,
-        note="One sentence of the thesis makes several claims. Each is measured separately: see the rows "
-        f"{', '.join(part.id for part in parts)}.",
-        of=parts[0].of,
-        group=True,
-    )

@@ -69,6 +69,7 @@ def thesis(
     from palpate_thesis.figure import studies, study
     from palpate_thesis.laboratory import describe_laboratory, load_laboratory
     from palpate_thesis.measure import MeasurementFormat
+    from palpate_thesis.printed_facts import count_contradictions
     from palpate_thesis.runs import Runs
 
     if list_:
@@ -86,7 +87,7 @@ def thesis(
     option = f" --laboratory {laboratory}" if name else ""
     command = f"palpate thesis{f' {figure}' if figure else ''}{option} --seeds {seeds}"
     try:
-        about = describe_laboratory(laboratory)
+        about = f"{describe_laboratory(laboratory)} {count_contradictions(values)}"
         written = MeasurementFormat(command, name or "inferred", drawn.endings, drawn.dpi, about)
         _measure(chosen, folder, Runs(range(seeds), laboratory=values), written, replace)
     except KeyboardInterrupt:
@@ -102,7 +103,7 @@ def _measure(
     from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 
     from palpate.report.page import Table
-    from palpate_thesis.claims import claims_of_studies, count_in_words, texts
+    from palpate_thesis.claims import count_in_words, texts
     from palpate_thesis.measure import measure
 
     screen = console()
@@ -120,7 +121,7 @@ def _measure(
         done = measure(
             chosen, runs, folder, written=written, replace=replace, started=start_study, resumed=say_resumed
         )
-    claims = claims_of_studies(done)
+    claims = [claim for study in done for claim in study.claims]
     rows = [(claim.id, claim.thesis, claim.measured, claim.verdict) for claim in claims]
     for line in count_in_words(claims):
         screen.print(line)

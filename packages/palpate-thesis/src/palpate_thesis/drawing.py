@@ -21,7 +21,6 @@ __all__ = [
     "ZERO",
     "Axes",
     "Figure",
-    "across",
     "apply_look",
     "force_figure",
     "legend_inside",
@@ -70,17 +69,6 @@ def panels(heights: Sequence[float], columns: int = 1, width: float = 9.0) -> tu
     size = (width, sum(heights) + 0.45 * len(heights))
     drawing, axes = style.grid(size, len(heights), columns, height_ratios=heights)
     return drawing, [axes[i : i + columns] for i in range(0, len(axes), columns)]
-
-
-def across(row: Sequence[Axes]) -> Axes:
-    """The first panel of a row, stretched over all of it; the others go."""
-    axis, *others = row
-    for other in others:
-        other.remove()
-    where = axis.get_subplotspec()
-    if where is not None:
-        axis.set_subplotspec(where.get_gridspec()[where.rowspan.start, :])
-    return axis
 
 
 def force_figure(shown: Record) -> Figure:

@@ -6,7 +6,7 @@ import json
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import resources
 from typing import Any, Literal
 
@@ -18,7 +18,7 @@ from palpate.errors import InputError, unknown
 from palpate.files import read_toml
 
 FILES = TomlFiles("laboratory", "a", "palpate_thesis", ("laboratories",))
-KEYS = {"about", "command", "sentences", "unknowns"}
+KEYS = {"about", "base", "command", "sentences", "unknowns"}
 LINEAR, RELAXING, STIFFENING = 0.0, 1.0, 2.0
 """Laws of the foam: spring and damper, standard linear solid, Hunt and Crossley."""
 LISTED_START = 0.454
@@ -269,7 +269,8 @@ def load_laboratory(name: str) -> Laboratory:
     values: Any = tables.get("unknowns")
     if not isinstance(values, dict):
         raise InputError(f"{name}: no table [unknowns]; a laboratory has its values there")
-    return laboratory_from(values, name)
+    base = load_laboratory(tables["base"]) if "base" in tables else BENCH
+    return laboratory_from(values, name, base)
 
 
 def describe_laboratory(name: str) -> str:
@@ -282,8 +283,8 @@ def describe_laboratory(name: str) -> str:
     return f"Laboratory: {name}. {about}".rstrip()
 
 
-def laboratory_from(values: Mapping[str, Any], where: str) -> Laboratory:
-    """A laboratory from named values; the others are the bench's.
+def laboratory_from(values: Mapping[str, Any], where: str, base: Laboratory) -> Laboratory:
+    """A laboratory from named values; the others are those of another laboratory.
 
     Raises:
         InputError: a name that is no unknown, a value that is no number or out of its range.
@@ -292,13 +293,19 @@ def laboratory_from(values: Mapping[str, Any], where: str) -> Laboratory:
     for name in values:
         if name not in by_name:
             raise InputError(f"{where}: {unknown('unknown of the laboratory', name, tuple(by_name))}")
-    return Laboratory(**{name: by_name[name].check(value, where) for name, value in values.items()})
+    return replace(base, **{name: by_name[name].check(value, where) for name, value in values.items()})
 
 
-def laboratory_text(laboratory: Laboratory, about: str, command: str, sentences: Sequence[str] = ()) -> str:
-    """A laboratory as a TOML file that `load_laboratory` reads, with the sentences for which it was chosen."""
-    values = [f"{name} = {value!r}" for name, value in laboratory.numbers().items()]
-    head = [f"about = {json.dumps(about)}", f"command = {json.dumps(command)}"]
-    if sentences:
-        head.append(f"sentences = {json.dumps(list(sentences))}")
-    return "\n".join([*head, "", "[unknowns]", *values]) + "\n"
+def laboratory_text(laboratory: Laboratory, start: Laboratory, **head: str | Sequence[str]) -> str:
+    """A laboratory as a TOML file that `load_laboratory` reads, with the values that are not those of its base.
+
+    Args:
+        laboratory: values.
+        start: the laboratory that the file names as `base`; the bench if it names none.
+        head: texts of the other keys.
+    """
+    values, others = laboratory.numbers(), start.numbers()
+    changed = [f"{name} = {value!r}" for name, value in values.items() if value != others.get(name)]
+    return (
+        "\n".join([*(f"{k} = {json.dumps(v)}" for k, v in head.items()), "", "[unknowns]", *changed]) + "\n"
+    )

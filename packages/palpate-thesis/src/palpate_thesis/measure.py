@@ -22,16 +22,14 @@ from palpate_thesis.claims import (
     VERDICTS,
     Done,
     ThesisClaim,
-    claims_of_studies,
     count_in_words,
     experiment_sentences,
     plausible_laboratories,
-    tables,
     texts,
 )
 from palpate_thesis.drawing import apply_look
 from palpate_thesis.figure import FigureModule, is_experiment
-from palpate_thesis.laboratory import BENCH, Laboratory
+from palpate_thesis.laboratory import BENCH, UNKNOWNS, Laboratory, load_laboratory
 from palpate_thesis.runs import Runs, sources_digest
 
 STATE = "thesis.json"
@@ -130,26 +128,20 @@ def runs_for(number: str, runs: Runs) -> Runs:
 
 
 def note_for(claim: ThesisClaim, laboratory: Laboratory) -> ThesisClaim:
-    """Replace the note in a laboratory other than the bench: the notes of the figures are about the bench.
-
-    The reason of claims.toml stands for one that does not hold; then the laboratory in which it does, and the unknowns
-    that decide it.
-    """
-    if laboratory.is_bench or claim.id not in experiment_sentences():
-        return claim
-    parts = []
-    if claim.verdict != "reproduced":
-        parts.append(tables()["claims"][claim.id].get("reason", ""))
-        elsewhere = plausible_laboratories().get(claim.id)
-        if elsewhere:
-            parts.append(f"It holds with --laboratory {elsewhere}, which keeps the printed values too.")
-    deciding = [name for name, ids in sensitivity().items() if claim.id in ids]
-    if deciding:
-        parts.append(f"Of the unknowns, changed one at a time, these decide it: {', '.join(deciding)}.")
-    else:
-        parts.append("No unknown, changed alone, decides it.")
-    parts.append("The note on the hand-chosen bench: --laboratory bench.")
-    return replace(claim, note=" ".join(part for part in parts if part))
+    """Add the laboratory in which a sentence holds that does not hold here, and the unknowns that decide it."""
+    parts = [claim.note]
+    if claim.verdict == "reproduced in a plausible laboratory":
+        elsewhere = plausible_laboratories()[claim.id]
+        parts.append(f"It holds with --laboratory {elsewhere}, which keeps the printed values too.")
+    if claim.id in experiment_sentences() and laboratory == load_laboratory("inferred"):
+        deciding = [name for name, ids in sensitivity().items() if claim.id in ids]
+        names = ", ".join(deciding)
+        parts.append(
+            f"Unknowns that decide it, changed alone: {names}."
+            if deciding
+            else "No unknown, changed alone, decides it."
+        )
+    return replace(claim, note=" ".join(parts))
 
 
 @cache
@@ -191,7 +183,7 @@ def _save_state(state: FolderState, folder: Path) -> None:
 def _write_results(state: FolderState, folder: Path) -> None:
     """Write claims.json, the page and the state, each file whole or as it was."""
     done = [state.done[number] for number in state.wanted if number in state.done]
-    write_json(folder / "claims.json", [asdict(row) for row in claims_of_studies(done)])
+    write_json(folder / "claims.json", [asdict(claim) for study in done for claim in study.claims])
     names = [f"{study.number}{end}" for study in done for end in ("", BESIDE if study.beside else "")]
     pictures = {name: data_address((folder / f"{name}.png").read_bytes(), "image/png") for name in names}
     missing = [number for number in state.wanted if number not in state.done]
@@ -238,11 +230,21 @@ def index_page(
         missing=missing,
         command=state.command,
         laboratory=state.laboratory,
-        values=state.values,
+        unknowns=_unknowns_table(state),
         besides=BESIDE,
         seconds=sum(study.seconds for study in done),
         scripts=(text_of("index.js", "palpate_thesis"),),
     )
+
+
+def _unknowns_table(state: FolderState) -> list[dict[str, Any]]:
+    """A row for each unknown of the laboratory, with the sentences that it decides alone."""
+    decided = sensitivity() if state.values == load_laboratory("inferred").numbers() else {}
+    return [
+        {"of": u, "value": state.values[u.name], "sentences": decided.get(u.name, ())}
+        for u in UNKNOWNS
+        if u.name in state.values
+    ]
 
 
 def chapter_of(number: str) -> str:

@@ -95,3 +95,10 @@ def contradictions(laboratory: Laboratory) -> list[str]:
                 if not fact.allows(value):
                     lines.append(f"{name}: {fact.path} is {value}, printed {fact.printed} ({fact.where})")
     return lines
+
+
+def count_contradictions(laboratory: Laboratory) -> str:
+    """Sentence on how many printed numbers a laboratory contradicts."""
+    count, lines = sum(len(group.facts) for group in printed_facts()), contradictions(laboratory)
+    named = f": {lines[0]}" if lines else ""
+    return f"Contradicts {len(lines) or 'none'} of the {count} printed numbers{named}."

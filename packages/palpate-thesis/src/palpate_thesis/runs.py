@@ -2,7 +2,7 @@
 
 import hashlib
 import threading
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +13,6 @@ from palpate.bench.speed import cores
 from palpate.bench.summary import INTERRUPTED
 from palpate.records import Record
 from palpate.studies.journal import sources
-from palpate_thesis.claims import often, on_one_line
 from palpate_thesis.laboratory import BENCH, Laboratory
 
 K = TypeVar("K")
@@ -110,13 +109,6 @@ RELAXING_FOAM = {
         "branch_time": 0.23,
     }
 }
-SURFACES: Mapping[str, Mapping[str, Any]] = {
-    "foam": {},
-    "rubber": {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}},
-    "relaxing\nfoam": RELAXING_FOAM,
-}
-
-
 NEAREST_WALL = 0.457
 """x of the nearest wall that the listed approach allows: it starts at 0.454 m and steps from 0.456 m outwards [m]."""
 
@@ -149,27 +141,3 @@ def friction_and_pose(experiment: Experiment) -> dict[str, Mapping[str, Any]]:
         "wall at\n0.457 m": move_wall(experiment, NEAREST_WALL),
         "wall at\n0.49 m": move_wall(experiment, 0.49),
     }
-
-
-def by_condition(
-    runs: Runs, worlds: Mapping[str, W], work: Callable[[W, int], T], full: Collection[str]
-) -> dict[str, list[T]]:
-    """`work` of each world and seed, by the world's name: over all seeds in the worlds of `full`, a few in others."""
-    cases = {
-        name: [(world, seed) for seed in runs.seeds[: None if name in full else VARIED_SEEDS]]
-        for name, world in worlds.items()
-    }
-    return runs.map_each(lambda case: work(*case), cases)
-
-
-def stops_holding(results: Mapping[str, Sequence[T]], holds: Callable[[T], bool]) -> str:
-    """Sentence with the variations under which a conclusion holds, and those under which it does not."""
-    good, bad = [], []
-    for name, runs in results.items():
-        if often(map(holds, runs)):
-            good.append(on_one_line(name))
-        else:
-            bad.append(f"{on_one_line(name)} ({sum(map(holds, runs))} of {len(runs)} runs)")
-    parts = [f"holds with: {', '.join(good)}"] if good else []
-    parts += [f"does not with: {', '.join(bad)}"] if bad else ["and under every variation tried"]
-    return f"It {'; it '.join(parts) if bad else ', '.join(parts)}."

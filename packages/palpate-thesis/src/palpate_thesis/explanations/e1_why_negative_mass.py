@@ -15,7 +15,7 @@ from palpate.signals.filters import Biquad, butterworth2, butterworth3
 from palpate_thesis.claims import ThesisClaim, claim, spread
 from palpate_thesis.drawing import ZERO, Axes, Figure
 from palpate_thesis.least_squares import panels, press_runs
-from palpate_thesis.runs import VARIED_SEEDS, Runs
+from palpate_thesis.runs import Runs
 
 CAUSES = {
     "offset": "displacement from the 5 N point",
@@ -138,12 +138,6 @@ LABELS = ("$M_e$ [kg]", "$B_e$ [N s/m]")
 LAGS = 1e-3 * np.arange(0.0, 11.0)
 SENSOR_LAG = 5.6e-3
 """[s]; of the force sensor alone, for the lag formula's test."""
-CHAINS = {
-    "perfect signals": (),
-    "only the force's lag": ("lag", "filter"),
-    "all but the force's lag": ("offset", "acceleration", "counts", "noise"),
-    "as in the thesis": tuple(CAUSES),
-}
 NEAR_FORMULA = 0.25
 NEAR_TRUTH = {"K": 0.02, "B": 0.05, "M": 0.25}
 """Shares of K and B; kilograms."""
@@ -153,18 +147,15 @@ class EstimatesOfPress(NamedTuple):
     """Least-squares estimates of one press, each (M, B, K)."""
 
     steps: Array  # with perfect signals, then with one cause more each, shape (7, 3)
-    alone: Array  # with one cause each, shape (6, 3)
-    chains: Array  # of `CHAINS`, shape (4, 3)
     lags: Array  # perfect signals, the force late by `LAGS`, shape (11, 3)
     sensor: Array  # late by the sensor's lag, shape (3,)
     matched: Array
 
 
 class Data(NamedTuple):
-    """Presses on each surface, as chosen and varied."""
+    """Presses on each surface."""
 
     presses: dict[str, list[EstimatesOfPress]]
-    varied: dict[str, dict[str, list[EstimatesOfPress]]]
     truth: dict[str, tuple[float, float, float]]  # M, B, K
 
     def middle(self, surface: str, what: str) -> Array:
@@ -173,12 +164,9 @@ class Data(NamedTuple):
 
 
 def run(runs: Runs) -> Data:
-    """One press a seed on each surface; conditions varied on the two that the model fits."""
-    varied = {
-        name: runs.by_name(press_runs.conditions(PARAMETERS[name]), _press, VARIED_SEEDS) for name in MODELLED
-    }
+    """One press a seed on each surface."""
     truth = {name: (e.surface.mass, e.surface.damping, e.surface.stiffness) for name, e in PARAMETERS.items()}
-    return Data(runs.by_name(PARAMETERS, _press), varied, truth)
+    return Data(runs.by_name(PARAMETERS, _press), truth)
 
 
 def _press(record: Record) -> EstimatesOfPress:
@@ -186,8 +174,6 @@ def _press(record: Record) -> EstimatesOfPress:
     names = list(CAUSES)
     return EstimatesOfPress(
         steps=np.array([estimate(press, names[:i]) for i in range(len(names) + 1)]),
-        alone=np.array([estimate(press, [name]) for name in names]),
-        chains=np.array([estimate(press, causes) for causes in CHAINS.values()]),
         lags=np.array([estimate(press, (), lag) for lag in LAGS]),
         sensor=estimate(press, (), SENSOR_LAG),
         matched=press.matched,
@@ -196,9 +182,8 @@ def _press(record: Record) -> EstimatesOfPress:
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """The thesis' own reason, the lag, the wrong model, and the cure."""
-    relaxing = _masses(data, "relaxing foam", "perfect signals")
-    wrong_model = claim("negative-mass.model", max(relaxing) < 0.0, masses=relaxing)
-    perfect = {s: _masses(data, s, "perfect signals") for s in MODELLED}
+    perfect = {s: [float(p.steps[0, 0]) for p in presses] for s, presses in data.presses.items()}
+    relaxing = perfect["relaxing foam"]
     right = all(abs(float(np.median(perfect[s])) - data.truth[s][0]) < 0.05 for s in MODELLED)
     masses = "; ".join(f"{s} {spread(perfect[s], 'kg', 2)}, true {data.truth[s][0]:g} kg" for s in MODELLED)
     parts, worst = [], 0.0
@@ -218,26 +203,16 @@ def check(data: Data) -> Sequence[ThesisClaim]:
             masses=masses,
             foam_added=_contributions(data, "plain foam"),
             rubber_added=_contributions(data, "rubber"),
-            filter=data.middle("rubber", "alone")[list(CAUSES).index("acceleration"), 0],
-            foam_without=np.median(_masses(data, "plain foam", "all but the force's lag")),
-            rubber_without=np.median(_masses(data, "rubber", "all but the force's lag")),
-            signs=_signs(data),
         ),
         claim(
             "negative-mass.lag",
             worst < NEAR_FORMULA,
             sensor_lag=1e3 * SENSOR_LAG,
             surfaces="; ".join(parts),
-            reach=_reach(data),
         ),
-        wrong_model,
+        claim("negative-mass.model", max(relaxing) < 0.0, masses=relaxing),
         _matched_claim(data),
     ]
-
-
-def _masses(data: Data, surface: str, chain: str) -> list[float]:
-    at = list(CHAINS).index(chain)
-    return [float(p.chains[at, 0]) for p in data.presses[surface]]
 
 
 def _contributions(data: Data, surface: str) -> str:
@@ -247,37 +222,6 @@ def _contributions(data: Data, surface: str) -> str:
     return (
         f"{steps[0]:.2f} kg, then {', '.join(f'{n} {s:+.2f}' for n, s in added)}, in all {steps[-1]:.2f} kg"
     )
-
-
-def _signs(data: Data) -> str:
-    """Sentences with the conditions under which the signs differ."""
-    sentences = []
-    for what, chain in (("The lag alone", "only the force's lag"), ("The whole chain", "as in the thesis")):
-        at = list(CHAINS).index(chain)
-        where = [
-            f"{surface} with {condition}"
-            for surface, by in data.varied.items()
-            for condition, presses in by.items()
-            if np.median([p.chains[at, 0] for p in presses]) >= 0.0
-        ]
-        sentences.append(
-            f"{what} makes the mass negative under {'all' if not where else 'all but these'} of them"
-        )
-        sentences[-1] += f": {', '.join(where)}." if where else "."
-    return f"Friction, pose, mass and damping were varied. {' '.join(sentences)}"
-
-
-def _reach(data: Data) -> str:
-    """Sentence with the lag up to which the formula is right."""
-    parts = []
-    for surface in MODELLED:
-        truth = data.truth[surface]
-        fits = data.middle(surface, "lags")
-        shifted = np.array([delayed_fit(*truth, lag)[0] for lag in LAGS[1:]])
-        good = np.abs(fits[1:, 0] - shifted) < NEAR_FORMULA * np.abs(shifted - truth[0])
-        upto = int(np.cumprod(good).sum())
-        parts.append(f"{1e3 * LAGS[upto]:g} ms on {surface}")
-    return f"For M it is within a quarter of the shift up to {' and '.join(parts)} (tried up to {1e3 * LAGS[-1]:g} ms)."
 
 
 def _matched_claim(data: Data) -> ThesisClaim:
@@ -334,7 +278,7 @@ def _lag_panel(axis: Axes, data: Data, index: int) -> None:
     panels.set_title(axis, "gh"[index], f"{name} of perfect signals, the force late by T")
     fine = np.linspace(0.0, float(LAGS[-1]), 100)
     for surface in MODELLED:
-        color = panels.COLORS[surface]
+        color = panels.COLORS[surface.removeprefix("plain ")]
         fits = data.middle(surface, "lags")[:, index]
         axis.plot(1e3 * LAGS, fits, "o", color=color, markersize=4, label=surface)
         predicted = [delayed_fit(*data.truth[surface], lag)[index] for lag in fine]

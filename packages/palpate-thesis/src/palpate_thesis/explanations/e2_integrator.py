@@ -9,17 +9,8 @@ from palpate.arrays import Array
 from palpate.bench import Experiment, with_values
 from palpate.records import Record
 from palpate.report import style
-from palpate.studies.metrics.window import rms
-from palpate_thesis.claims import ThesisClaim, claim, on_one_line, spread
-from palpate_thesis.drawing import Axes, Figure, across, limits, panels
-from palpate_thesis.force_control.interventions import (
-    COLUMN,
-    HOLD_INTERVAL,
-    WEIGHT_COLUMNS,
-    WeightsAtMoment,
-    hold,
-    watch,
-)
+from palpate_thesis.claims import ThesisClaim, claim, spread
+from palpate_thesis.drawing import Axes, Figure, limits, panels
 from palpate_thesis.force_control.tracking import (
     FOAM,
     RUBBER,
@@ -28,7 +19,6 @@ from palpate_thesis.force_control.tracking import (
     since_contact,
     slot,
     tracking,
-    variations,
 )
 from palpate_thesis.runs import Runs
 
@@ -52,8 +42,6 @@ SHARE = 0.10
 """Within which gains and RMS errors have to agree."""
 FITTED = 5.0
 """Seconds after contact over which the gain is measured [s]."""
-OUTSIDE = ("random\nweights", "rate of\nthe listing", "clock\nruns on")
-"""Variations that are of the network or the reference alone."""
 
 
 class BothControllers(NamedTuple):
@@ -63,8 +51,6 @@ class BothControllers(NamedTuple):
     pi: Record
     network_runs: list[Tracking]
     pi_runs: list[Tracking]
-    ratios: dict[str, list[float]]  # RMS of the network over that of the PI, by variation
-    held: dict[str, float]  # the same with the network's weights from the torques held at zero
 
 
 class Data(NamedTuple):
@@ -90,7 +76,6 @@ def check(data: Data) -> Sequence[ThesisClaim]:
         f"{name} {_median(p.network_runs):.2f} and {_median(p.pi_runs):.2f} N"
         for name, p in data.pairs.items()
     )
-    held = [value for pair in data.pairs.values() for value in pair.held.values()]
     seeds = len(next(iter(data.pairs.values())).pi_runs)
     apart = max(abs(_median(p.network_runs) / _median(p.pi_runs) - 1.0) for p in data.pairs.values())
     return [
@@ -112,8 +97,6 @@ def check(data: Data) -> Sequence[ThesisClaim]:
             apart=apart,
             seeds=seeds,
             share=SHARE,
-            outliers=_outliers(data),
-            held_range=f"{min(held):.2f} to {max(held):.2f}",
         ),
     ]
 
@@ -126,7 +109,8 @@ def plot(data: Data) -> Figure:
     style.legend(grid[0][0])
     for axis in grid[1]:
         axis.set_xlabel("time since contact [s]")
-    _gain_panel(across(grid[2]), data.gains)
+    for axis, (name, measured) in zip(grid[2], data.gains.items(), strict=True):
+        _gain_panel(axis, name, measured)
     return drawing
 
 
@@ -140,44 +124,22 @@ def _overlay(axis: Axes, name: str, pair: BothControllers) -> None:
     axis.set(ylabel="force [N]", xlim=JUDGED)
 
 
-def _gain_panel(axis: Axes, gains: Mapping[str, Array]) -> None:
+def _gain_panel(axis: Axes, name: str, measured: Array) -> None:
     axis.plot(RATES, GAINS, color=style.INK, linewidth=1, label="eta (A/2)²/Ts")
-    for (name, measured), color, marker in zip(gains.items(), style.SERIES[:2], "o^", strict=True):
-        ring: Any = {"color": color, "markersize": 6, "fillstyle": "none", "label": name}
-        axis.plot(RATES, np.median(measured, axis=1), marker, **ring)
+    ring: Any = {"color": style.SERIES[0], "markersize": 6, "fillstyle": "none", "label": name}
+    axis.plot(RATES, np.median(measured, axis=1), "o", **ring)
     axis.axvline(RATE, color=style.MEASURED, linewidth=1, linestyle="--", label="the text's")
     axis.axvline(1e-4, color=style.MEASURED, linewidth=1, linestyle=":", label="the listing's")
     axis.set(xscale="log", yscale="log", xlabel="learning rate eta", ylabel="K_i [1/s]")
-    style.legend(axis, ncols=5, columnspacing=0.9, handletextpad=0.4)
+    style.legend(axis, ncols=2)
 
 
 def _pair(runs: Runs, experiment: Experiment) -> BothControllers:
     measure = tracking(*JUDGED)
     plain = with_values(experiment, PI)
     network_runs, pi_runs = runs.over_seeds(experiment, measure), runs.over_seeds(plain, measure)
-    held: dict[str, float] = {}
-    ratios = {"as\nchosen": [a.rms / b.rms for a, b in zip(network_runs, pi_runs, strict=True)]}
-    for name, e in variations(experiment, 0).items():
-        if name not in OUTSIDE:
-            network, pi = runs.over([(one, runs.seeds[0]) for one in (e, with_values(e, PI))], measure)
-            ratios[name] = [network.rms / pi.rms]
-            held[name] = _error_without_torques(runs, e) / pi.rms
     network_shown, pi_shown = (slot(runs.record(e), *JUDGED) for e in (experiment, plain))
-    return BothControllers(network_shown, pi_shown, network_runs, pi_runs, ratios, held)
-
-
-def _error_without_torques(runs: Runs, experiment: Experiment) -> float:
-    """RMS error of the first seed when the network's weights from the torques are held at zero [N]."""
-    zero = hold(WEIGHT_COLUMNS["all torques"])
-    errors: list[Array] = []
-
-    def look(moment: WeightsAtMoment) -> None:
-        zero(moment)
-        if JUDGED[0] <= moment.t < JUDGED[1]:
-            errors.append(moment.rows[:, COLUMN["force"]] - moment.rows[:, COLUMN["force_desired"]])
-
-    watch(experiment, runs.seeds[0], JUDGED[1], look, runs.waiting, HOLD_INTERVAL)
-    return rms(np.concatenate(errors)) if errors else float("nan")
+    return BothControllers(network_shown, pi_shown, network_runs, pi_runs)
 
 
 def _gains(runs: Runs, experiment: Experiment) -> Array:
@@ -196,18 +158,3 @@ def fit_integral_gain(record: Record) -> float:
 
 def _median(runs: Sequence[Tracking]) -> float:
     return float(np.median([run.rms for run in runs]))
-
-
-def _outliers(data: Data) -> str:
-    """Sentence with the variations in which the errors differ by more."""
-    far = [
-        f"{experiment}, {on_one_line(name)} ({np.median(values):.2f})"
-        for experiment, pair in data.pairs.items()
-        for name, values in pair.ratios.items()
-        if abs(np.median(values) - 1.0) > SHARE
-    ]
-    if not far:
-        return "It holds with half and double friction, at 0.40 m and 0.49 m, and on the other foam."
-    return (
-        f"The ratio leaves that tenth with: {', '.join(far)}; everywhere else that was tried it stays inside."
-    )

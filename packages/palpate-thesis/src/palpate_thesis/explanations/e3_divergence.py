@@ -14,14 +14,12 @@ from palpate_thesis.drawing import LIMIT_LINE, Axes, Figure, legend_inside, pane
 from palpate_thesis.explanations.e2_integrator import PI
 from palpate_thesis.force_control.interventions import (
     HOLD_INTERVAL,
-    WEIGHT_COLUMNS,
-    WeightsAtMoment,
-    hold,
     layers,
     watch,
+    without_torques,
 )
-from palpate_thesis.force_control.tracking import FOAM, RUBBER, SINE, since_contact
-from palpate_thesis.runs import RELAXING_FOAM, Runs, move_wall, rougher
+from palpate_thesis.force_control.tracking import FOAM, RUBBER, since_contact
+from palpate_thesis.runs import RELAXING_FOAM, Runs, rougher
 
 DURATION = 240.0
 """Seconds of contact that count as steady [s]."""
@@ -114,6 +112,7 @@ def steps_panel(axis: Axes, by_rate: Mapping[float, Sequence[LongRun]]) -> None:
 
 
 NUMBER = "delayed-divergence"
+WITHOUT_TORQUES = "weights from all torques held at zero"
 RELAXING = with_values(FOAM, RELAXING_FOAM)
 PARAMETERS: Mapping[str, Experiment] = {"foam that relaxes": RELAXING, "foam": FOAM, "rubber": RUBBER}
 RATES = (1e-4, 5e-5, 2e-5, 1e-5, 5e-6)
@@ -123,22 +122,9 @@ CAUSES: Mapping[str, Mapping[str, Any]] = {
     "as chosen": {},
     "constant force": {"force.second": None},
     "no noise": {"force_sensor.noise": 0.0},
-    "steps and sine": SINE,
-    "foam damped by 60 N s/m": {"surface.damping": 60.0},
     "foam damped by 200 N s/m": {"surface.damping": 200.0},
-    "K_fp = 0": {"controller.kf": 0.0},
     "K_pv halved": {"controller.kv": 40.0},
-    "random weights": {"controller.weights": "random", "controller.weights_seed": 1},
-    "8 hidden neurons": {
-        "controller.weights": "random",
-        "controller.weights_seed": 1,
-        "controller.layers": (8,),
-    },
-    "friction half": rougher(FOAM, 0.5),
     "friction double": rougher(FOAM, 2.0),
-    "wall at 0.40 m": move_wall(FOAM, 0.40),
-    "wall at 0.49 m": move_wall(FOAM, 0.49),
-    "PI, K_i = 5 per second": PI,
 }
 
 
@@ -161,10 +147,9 @@ def run(runs: Runs) -> Data:
         courses[name] = runs.map_each(lambda case: _course(runs, *case), cases)
     plain = _losses(runs, {name: with_values(e, PI) for name, e in PARAMETERS.items()})
     causes = _losses(runs, {name: with_values(RELAXING, change) for name, change in CAUSES.items()})
-    causes |= runs.map_each(
-        lambda columns: watch(RELAXING, runs.seeds[0], DURATION, hold(columns), runs.waiting, HOLD_INTERVAL),
-        {f"weights from {name} held at zero": [columns] for name, columns in WEIGHT_COLUMNS.items()},
-    )
+    causes[WITHOUT_TORQUES] = [
+        watch(RELAXING, runs.seeds[0], DURATION, without_torques, runs.waiting, HOLD_INTERVAL)
+    ]
     return Data(courses, plain, causes, _loss(runs, courses["foam that relaxes"][5e-5][0].lost))
 
 
@@ -176,7 +161,7 @@ def check(data: Data) -> Sequence[ThesisClaim]:
     damped = [runs for name in ("foam", "rubber") for runs in data.courses[name].values()]
     others = [run.lost for runs in damped for run in runs]
     lost_others = sum(lost is not None for lost in others)
-    without_torques = _range(data.causes["weights from all torques held at zero"])
+    without_torques = _range(data.causes[WITHOUT_TORQUES])
     return [
         claim(
             "neural-diverges.loss",
@@ -218,9 +203,9 @@ def plot(data: Data) -> Figure:
 def _course(runs: Runs, experiment: Experiment, seed: int) -> LongRun:
     rows: list[tuple[Any, ...]] = []
 
-    def look(moment: WeightsAtMoment) -> None:
-        assert moment.neural is not None
-        rows.append((moment.t, weight_norms(moment.neural), torque_gains(moment.neural)))
+    def look(t: float, state: NeuralState | None) -> None:
+        assert state is not None
+        rows.append((t, weight_norms(state), torque_gains(state)))
 
     lost = watch(experiment, seed, DURATION, look, runs.waiting)
     t, sizes, gains = map(np.array, zip(*rows, strict=True))
@@ -245,7 +230,7 @@ def torque_gains(state: NeuralState) -> Array:
 def _losses(runs: Runs, experiments: Mapping[str, Experiment]) -> dict[str, list[float | None]]:
     """Time at which each loses contact with the first seed [s]."""
     return runs.map_each(
-        lambda e: watch(e, runs.seeds[0], DURATION, lambda _: None, runs.waiting),
+        lambda e: watch(e, runs.seeds[0], DURATION, lambda _, __: None, runs.waiting),
         {name: [e] for name, e in experiments.items()},
     )
 

@@ -61,6 +61,11 @@ def _corner(values: Array) -> tuple[float, float]:
     return float(w0 / (2.0 * np.pi)), float(w0 * r1 * r2 * c1 / (r1 + r2))
 
 
+def gain_at(frequency: float) -> float:
+    """Gain with the printed values at a frequency [Hz], in decibels."""
+    return float(_gain(np.array(list(PARAMETERS.values())), np.array(frequency)))
+
+
 def _gain(values: Array, frequency: Array) -> Array:
     corner, quality = _corner(values)
     s = 1j * frequency / corner

@@ -1,6 +1,6 @@
 """Figures 6.2 and 6.5: least squares some time later, where K_e and f/x can be compared, and the off-line ratios."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -10,10 +10,8 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.bench import Experiment
 from palpate.records import Record
-from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, spread
-from palpate_thesis.drawing import STATED, ZERO, Axes, Figure
-from palpate_thesis.drawing import panels as rows_of_panels
+from palpate_thesis.drawing import STATED, ZERO, Figure
 from palpate_thesis.least_squares import panels, press_runs
 from palpate_thesis.least_squares.press_runs import PressEstimates, median
 from palpate_thesis.runs import Runs
@@ -32,24 +30,25 @@ LEVEL, PLAUSIBLE = 0.10, 0.25
 class Data(NamedTuple):
     """Data and criteria of a figure of the later slot."""
 
-    shown: dict[str, Record]  # one press of each surface
-    presses: dict[str, list[PressEstimates]]  # of each surface, over the seeds
-    varied: dict[str, list[PressEstimates]]  # of the first surface, by condition
-    ratios: dict[str, Array]  # of the first surface: quantiles of K, B, M, each shape (seeds, 3)
-    truth: dict[str, float]  # M, B, K of the first surface
+    surface: str
+    shown: Record  # one press
+    presses: list[PressEstimates]  # one a seed
+    ratios: dict[str, Array]  # quantiles of K, B, M, each shape (seeds, 3)
+    truth: dict[str, float]  # M, B, K of the surface
 
 
-def run(runs: Runs, surfaces: Mapping[str, Experiment]) -> Data:
-    """One press a seed on each surface, and conditions varied on the first of them."""
-    first = next(iter(surfaces.values()))
-    each = runs.over_seeds(first, lambda record: by_ratios(press_runs.contact(record)))
-    surface = msgspec.to_builtins(runs.laboratory.adapt(first).surface)
+def run(runs: Runs, surface: str, experiment: Experiment) -> Data:
+    """One press a seed."""
+    each = runs.over_seeds(
+        experiment, lambda record: (press_runs.press_estimates(record), by_ratios(press_runs.contact(record)))
+    )
+    own = msgspec.to_builtins(runs.laboratory.adapt(experiment).surface)
     return Data(
-        shown={name: press_runs.contact(runs.record(e)) for name, e in surfaces.items()},
-        presses=runs.by_name(surfaces, press_runs.press_estimates),
-        varied=press_runs.sweep(runs, press_runs.conditions(first)),
-        ratios={key: np.array([quantiles[key] for quantiles in each]) for key in "KBM"},
-        truth={"M": surface["mass"], "B": press_runs.own_damping(surface), "K": surface["stiffness"]},
+        surface,
+        press_runs.contact(runs.record(experiment)),
+        [estimates for estimates, _ in each],
+        {key: np.array([quantiles[key] for _, quantiles in each]) for key in "KBM"},
+        {"M": own["mass"], "B": press_runs.own_damping(own), "K": own["stiffness"]},
     )
 
 
@@ -89,7 +88,7 @@ def press_claim(
     unit: str,
     **numbers: Any,
 ) -> ThesisClaim:
-    """Claim that is reproduced if it holds for most of the seeds on the first surface.
+    """Claim that is reproduced if it holds for most of the seeds.
 
     Args:
         data: of the figure.
@@ -99,19 +98,9 @@ def press_claim(
         unit: of the number.
         numbers: further numbers for the claim's texts.
     """
-    (surface, nominal), *others = data.presses.items()
-    fails = press_runs.failing(data.varied, holds)
-    there = [
-        f" On {n} it holds for {sum(map(holds, presses))} of {len(presses)} seeds." for n, presses in others
-    ]
-    return claim(
-        id_,
-        2 * sum(map(holds, nominal)) > len(nominal),
-        surface=surface,
-        surfaces="; ".join(f"{n} {spread([measure(f) for f in v], unit)}" for n, v in data.presses.items()),
-        where=press_runs.where_it_fails(fails, len(data.varied)) + "".join(there),
-        **numbers,
-    )
+    good = 2 * sum(map(holds, data.presses)) > len(data.presses)
+    values = spread([measure(press) for press in data.presses], unit)
+    return claim(id_, good, surface=data.surface, surfaces=f"{data.surface} {values}", **numbers)
 
 
 def _ratio_claim(data: Data, id_: str) -> ThesisClaim:
@@ -126,24 +115,6 @@ def _ratio_claim(data: Data, id_: str) -> ThesisClaim:
     )
 
 
-def _ratios(axis: Axes, data: Data) -> None:
-    surface = next(iter(data.presses))
-    axis.set_title(f"Ratios of single samples (bars: 8 of 10), {surface}")
-    for i, key in enumerate("KBM"):
-        low, middle, high = np.median(data.ratios[key], axis=0) / data.truth[key]
-        axis.plot([low, high], [i, i], color=style.MEASURED, linewidth=6, solid_capstyle="butt")
-        labels = (None, None) if i else ("ratios, middle", "least squares")
-        axis.plot(middle, i, "|", color=style.INK, markersize=13, label=labels[0])
-        fit = median([getattr(f, key) for f in data.presses[surface]]) / data.truth[key]
-        axis.plot(fit, i, "o", color=style.SERIES[0], label=labels[1])
-    axis.axvline(1.0, **style.KNOWN, label="true")
-    axis.set_xscale("symlog", linthresh=2.0)
-    axis.set_yticks(range(3), ["K", "B", "M"])
-    axis.set_ylim(2.6, -0.6)
-    axis.set_xlabel("share of the true value")
-    axis.legend(loc="upper left")
-
-
 def plausible(press: PressEstimates) -> bool:
     """True if B_e is near the surface's own B."""
     return abs(press.B / press.true_B - 1.0) < PLAUSIBLE
@@ -151,29 +122,26 @@ def plausible(press: PressEstimates) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Later:
-    """The figure of one surface; `judged` is the last of its parameters, and the others are shown beside it."""
+    """The figure of one surface."""
 
     NUMBER: str
-    PARAMETERS: Mapping[str, Experiment]
-    judged: str  # of the parameters
+    PARAMETERS: Experiment
+    surface: str
     claim: str  # the beginning of its claims' names
     ratio: str  # the name of the claim on single samples
     printed: tuple[float, float]  # K_e and f/x [kN/m]
     digit: float  # half a unit of their last digit [kN/m]
 
     def run(self, runs: Runs) -> Data:
-        """One press a seed on each surface."""
-        return run(runs, self.PARAMETERS)
+        """One press a seed."""
+        return run(runs, self.surface, self.PARAMETERS)
 
     def check(self, data: Data) -> Sequence[ThesisClaim]:
         """How near K_e is to f/x, its level, B and M, and the ratios."""
-        judged, id_, kilo = data.presses[self.judged], self.claim, 1e3 * self.printed[0]
+        id_, kilo = self.claim, 1e3 * self.printed[0]
         limits = {"least": 100.0 * self.apart[0], "most": 100.0 * self.apart[1]}
-        early, late = (100.0 * median([getattr(f, a) for f in judged]) for a in ("early_apart", "apart"))
         return [
-            press_claim(
-                data, id_, lambda f: 100.0 * f.apart, self.near, "%", early=early, late=late, **limits
-            ),
+            press_claim(data, id_, lambda f: 100.0 * f.apart, self.near, "%", **limits),
             press_claim(
                 data, f"{id_}.K", lambda f: 1e-3 * f.K, lambda f: abs(f.K / kilo - 1.0) < LEVEL, "kN/m"
             ),
@@ -196,8 +164,8 @@ class Later:
     def plot(self, data: Data) -> Figure:
         """The thesis' six panels in the later slot."""
         drawing, axes = panels.grid(3)
-        press = data.shown[self.judged]
-        panels.six(axes, {self.judged: press}, "thesis", press_runs.SLOT)
+        press = data.shown
+        panels.six(axes, self.surface, press, "thesis", press_runs.SLOT)
         axes[5].set_ylim(*axes[4].get_ylim())
         for axis in axes[4:6]:
             axis.axhline(1e-3 * press_runs.ratio(press), **STATED)
@@ -207,15 +175,9 @@ class Later:
             axis.axhline(0.0, **ZERO)
         return drawing
 
-    def beside(self, data: Data) -> Figure:
-        """Estimates from single samples by the ratios of section 5.1."""
-        drawing, ((axis,),) = rows_of_panels([2.4])
-        _ratios(axis, data)
-        return drawing
-
 
 _NAMES = ("least-squares-foam-level", "single-sample-ratios.foam")
-FOAM = Later("6.2", press_runs.FOAMS, "relaxing foam", *_NAMES, printed=(7.2, 6.8), digit=0.05)
+FOAM = Later("6.2", press_runs.PLAIN, "foam", *_NAMES, printed=(7.2, 6.8), digit=0.05)
 _NAMES = ("least-squares-rubber-level", "single-sample-ratios.rubber")
-RUBBER = Later("6.5", {"rubber": press_runs.RUBBER}, "rubber", *_NAMES, printed=(44.0, 44.0), digit=0.5)
+RUBBER = Later("6.5", press_runs.RUBBER, "rubber", *_NAMES, printed=(44.0, 44.0), digit=0.5)
 STUDIES = (FOAM, RUBBER)

@@ -62,9 +62,9 @@ class Data(NamedTuple):
 
 
 def run(runs: Runs) -> Data:
-    """One press a seed on both foams; one on each of the others."""
+    """One press a seed on the foam; one on each of the others."""
     foams = runs.by_name(PARAMETERS, press_runs.press_estimates, 1)
-    return Data(later.run(runs, press_runs.FOAMS), {name: presses[0] for name, presses in foams.items()})
+    return Data(later.run(runs, "foam", press_runs.PLAIN), {name: each[0] for name, each in foams.items()})
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
@@ -90,12 +90,6 @@ def check(data: Data) -> Sequence[ThesisClaim]:
     ]
 
 
-def _count(data: Data, *what: str) -> str:
-    columns = [list(SHOWS).index(name) for name in what]
-    good = sum(all(row[i] for i in columns) for row in data.table.values())
-    return f"{good} of the {len(data.foams)} foams tried"
-
-
 def _raw_signs(data: Data) -> list[ThesisClaim]:
     """Signs of M and B, and K, from raw signals."""
     raw = {
@@ -103,13 +97,8 @@ def _raw_signs(data: Data) -> list[ThesisClaim]:
         "B": ("N s/m", "raw: B < 0", lambda f: f.B_raw),
         "K": ("%", "raw: K = f/x", lambda f: 100.0 * f.apart_raw),
     }
-    both = ("raw: B < 0", "raw: M < 0")
-    numbers = {"both": _count(data, *both), "all": _count(data, *both, "B > 0")}
-    numbers |= {key: _count(data, shown) for key, (_, shown, _) in raw.items()}
     return [
-        later.press_claim(
-            data.later, f"least-squares-raw-signals.{key}", measure, SHOWS[shown], unit, **numbers
-        )
+        later.press_claim(data.later, f"least-squares-raw-signals.{key}", measure, SHOWS[shown], unit)
         for key, (unit, shown, measure) in raw.items()
     ]
 
@@ -117,8 +106,8 @@ def _raw_signs(data: Data) -> list[ThesisClaim]:
 def plot(data: Data) -> Figure:
     """The six panels from raw signals."""
     drawing, axes = panels.grid(3)
-    surface, press = next(iter(data.later.shown.items()))
-    panels.six(axes, {surface: press}, "raw", (0.0, press_runs.FIRST))
+    press = data.later.shown
+    panels.six(axes, "foam", press, "raw", (0.0, press_runs.FIRST))
     panels.calm_limits(axes[4], panels.calm_ratio(press, "force_sampled"))
     late = press_runs.between(press, 0.1, press_runs.FIRST)
     for axis, (key, (_, scale)) in zip(axes[1:6:2], panels.PARAMETERS.items(), strict=True):

@@ -8,7 +8,6 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import Experiment
-from palpate.identifiers.neural_probe import SETTINGS
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim
@@ -16,40 +15,22 @@ from palpate_thesis.drawing import STATED, Axes, Figure
 from palpate_thesis.drawing import panels as rows_of_panels
 from palpate_thesis.least_squares import panels
 from palpate_thesis.neural_identifier import claims, network
-from palpate_thesis.neural_identifier.claims import ClaimPart, Grounds
-from palpate_thesis.neural_identifier.network import NetworkChoice
+from palpate_thesis.neural_identifier.claims import ClaimPart
+from palpate_thesis.neural_identifier.network import NetworkAnswer
 from palpate_thesis.runs import Runs
 
 SHOWN_STARTS = 5
-SLOW = NetworkChoice(amplitude=25.0, weights=0.01)
-"""An amplitude just above the force and weights as small as those in the listing of the controller."""
 CALM = 60
 """Milliseconds after which curves set the scale of a panel."""
-NAMES = {"foam": "plain foam", "rubber": "rubber"}
 
 
 class Data(NamedTuple):
-    """Data of such a figure: a press, the answers of a few networks on it, and the grounds of the claims."""
+    """Data of such a figure: a press, the answers of a few networks on it, and the answers of all runs."""
 
+    surface: str
     press: network.NetworkPress  # that of the first noise seed
     curves: list[Array]  # K, B, M and error of a few starts on it
-    grounds: Grounds
-
-
-def grounds(
-    runs: Runs, experiment: Experiment, surface: str, contacts: Sequence[network.NetworkPress]
-) -> Grounds:
-    """Grounds of the claims about a surface."""
-    x = SETTINGS[surface].values[0]
-    at_probe = experiment.approach.switch + runs.laboratory.adapt(experiment).surface.stiffness * x
-    return Grounds(
-        surface,
-        network.answers(runs, contacts, network.chosen_network(runs)),
-        network.sweep(runs, contacts),
-        network.answers_under_conditions(runs, experiment, surface),
-        at_probe / x / float(np.median([press.ratio for press in contacts])),
-        len(network.starts(runs)),
-    )
+    answers: list[NetworkAnswer]
 
 
 def _record(data: Data) -> Record:
@@ -82,8 +63,8 @@ def _others(axes: list[Axes], data: Data, color: str) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class NetworkFirstSeconds:
-    """The figure of one surface."""
+class NetworkFigure:
+    """A figure of the network on one surface."""
 
     NUMBER: str
     PARAMETERS: Experiment
@@ -91,22 +72,24 @@ class NetworkFirstSeconds:
     parts: Sequence[ClaimPart]  # of the thesis' claims
 
     def run(self, runs: Runs) -> Data:
-        """One press a noise seed, all starts on each; then the network and the conditions varied."""
-        presses = network.presses(runs, self.PARAMETERS, self.surface)
-        own = network.chosen_network(runs)
+        """One press a noise seed, all starts on each."""
+        presses, chosen = network.presses(runs, self.PARAMETERS, self.surface), network.chosen_network(runs)
         starts = list(dict.fromkeys((*network.starts(runs), *network.STARTS)))[:SHOWN_STARTS]
-        curves = [network.learn(presses[0], own, start)[1] for start in starts]
-        return Data(presses[0], curves, grounds(runs, self.PARAMETERS, self.surface, presses))
+        curves = [network.learn(presses[0], chosen, start)[1] for start in starts]
+        return Data(self.surface, presses[0], curves, network.answers(runs, presses, chosen))
 
     def check(self, data: Data) -> Sequence[ThesisClaim]:
         """Settling times and values of K, B and M."""
-        return claims.claims(data.grounds, self.parts)
+        return claims.claims(self.surface, data.answers, self.parts)
+
+
+class NetworkFirstSeconds(NetworkFigure):
+    """Coefficients by the network in the first four seconds."""
 
     def plot(self, data: Data) -> Figure:
         """Six panels as in the thesis."""
         drawing, axes = panels.grid(3)
-        name = NAMES[data.grounds.surface]
-        panels.six(axes, {name: _record(data)}, "probe", (0.0, network.PRESS))
+        panels.six(axes, data.surface, _record(data), "probe", (0.0, network.PRESS))
         for axis, (_, scale), i in zip(axes[1::2], panels.PARAMETERS.values(), (2, 1, 0), strict=True):
             panels.calm_limits(axis, scale * data.curves[0][CALM:, i])
         panels.calm_limits(axes[4], 1e-3 * data.press.force[CALM:] / data.press.inputs[CALM:, 0])
@@ -116,25 +99,18 @@ class NetworkFirstSeconds:
         """M, B and K of five starts, by least squares (dashed), and f/x (dotted)."""
         drawing, rows = rows_of_panels([1.8, 1.8, 1.8])
         axes = [row[0] for row in rows]
-        _others(axes, data, panels.COLORS[NAMES[data.grounds.surface]])
+        _others(axes, data, panels.COLORS[data.surface])
         for axis, (label, _) in zip(axes, panels.PARAMETERS.values(), strict=True):
             axis.set(ylabel=label, xlim=(0.0, network.PRESS), xlabel="time since 5 N [s]")
         return drawing
 
 
-@dataclass(frozen=True, eq=False)
-class NetworkError(NetworkFirstSeconds):
-    """The error of the output on foam, as chosen and of a network that learns slowly."""
+class NetworkError(NetworkFigure):
+    """The error of the output on foam."""
 
     def plot(self, data: Data) -> Figure:
         """The error along a press."""
-        return self._error(data.curves[0][:, 3])
-
-    def beside(self, data: Data) -> Figure:
-        """The error with an amplitude of 25 N and weights to 0.01, which brings it near 0.6 s."""
-        return self._error(network.learn(data.press, SLOW, 0)[1][:, 3])
-
-    def _error(self, error: Array) -> Figure:
+        error = data.curves[0][:, 3]
         drawing, ((axis,),) = rows_of_panels([2.6])
         axis.plot(np.arange(len(error)) * network.TICK, error, color=style.SERIES[0], linewidth=0.7)
         axis.axhspan(-network.GONE, network.GONE, color=style.OK, alpha=0.15, linewidth=0)

@@ -1,13 +1,13 @@
 """Figure 6.10: the hybrid controller alone, without integral, on foam."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from palpate.bench import with_values
 from palpate.records import Record
 from palpate.studies.metrics.following import SHARE
-from palpate_thesis.force_control.tracking import FOAM, RUBBER, ForceStudy, Tracked, since_contact
+from palpate_thesis.force_control.tracking import FOAM, RUBBER, ForceStudy, since_contact
 
 HYBRID = {
     "controller": {"kind": "hybrid", "kp": 400.0, "kv": 80.0, "kf": 0.25, "ki": 0.0},
@@ -24,28 +24,6 @@ class Ends(NamedTuple):
     low: float  # at 10 N
 
 
-class HybridAlone(ForceStudy):
-    """Both levels have to be missed by more than a tenth of the desired force."""
-
-    label, limit = "error at 20 N [N]", 20.0 * SHARE
-
-    def measure(self, record: Record) -> Ends:
-        """Errors at the ends of the intervals."""
-        return interval_ends(record)
-
-    def agrees(self, run: Ends) -> bool:
-        """True if both levels are missed."""
-        return misses(run)
-
-    def size(self, run: Ends) -> float:
-        """Error at 20 N without its sign."""
-        return abs(run.high)
-
-    def numbers(self, data: Tracked) -> dict[str, Any]:
-        """Errors on foam and on rubber."""
-        return {"foam": data.nominal, "rubber": data.varied["rubber"], "share": SHARE}
-
-
 def misses(ends: Ends) -> bool:
     """True if both levels are missed by more than a tenth."""
     return abs(ends.high) > 20.0 * SHARE and abs(ends.low) > 10.0 * SHARE
@@ -60,7 +38,17 @@ def interval_ends(record: Record) -> Ends:
 
 
 STUDIES = (
-    HybridAlone(
-        "6.10", "hybrid-alone-falls-short", PARAMETERS, SHOWN, {"rubber": with_values(RUBBER, HYBRID)}
+    ForceStudy(
+        "6.10",
+        "hybrid-alone-falls-short",
+        PARAMETERS,
+        interval_ends,
+        misses,
+        size=lambda run: abs(run.high),
+        label="error at 20 N [N]",
+        limit=20.0 * SHARE,
+        numbers=lambda data: {"foam": data.nominal, "rubber": data.varied["rubber"], "share": SHARE},
+        shown=SHOWN,
+        others={"rubber": with_values(RUBBER, HYBRID)},
     ),
 )

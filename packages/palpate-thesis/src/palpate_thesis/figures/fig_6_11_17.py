@@ -1,6 +1,5 @@
 """Figures 6.11 to 6.13, 6.16, 6.17: the neural controller follows steps, with a sine on top too, on foam and rubber."""
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +11,7 @@ from palpate.studies.metrics.following import LIMIT
 from palpate_thesis.claims import ThesisClaim, claim
 from palpate_thesis.drawing import LIMIT_LINE, Figure, panels
 from palpate_thesis.force_control import tracking
-from palpate_thesis.force_control.tracking import FOLLOWS, ForceStudy, Tracked, Tracking, since_contact
+from palpate_thesis.force_control.tracking import FOLLOWS, ForceStudy, Tracked, since_contact
 from palpate_thesis.runs import Runs
 
 JUDGED = (10.0, 15.0)
@@ -24,41 +23,50 @@ SMOOTHED = 0.25
 Window = tuple[float, float]
 
 
-@dataclass(frozen=True, eq=False)
-class Steps(ForceStudy):
+def _numbers(data: Tracked) -> dict[str, Any]:
+    """Errors and saturation in words."""
+    limited = 100 * float(np.median([run.saturated for run in data.nominal]))
+    described = tracking.describe(data.nominal)
+    return {
+        "described": described,
+        "limited": limited,
+        "follows": FOLLOWS,
+        "following": tracking.FOLLOWING,
+    }
+
+
+def _steps(
+    number: str,
+    id_: str,
+    experiment: Experiment,
+    judged: Window = JUDGED,
+    shown: Window = (9.5, 13.5),
+    follows: bool = True,
+    kind: type[ForceStudy] = ForceStudy,
+) -> ForceStudy:
     """The figure of one surface and one desired force.
 
     Args:
+        number: of the figure.
+        id_: of its claim.
+        experiment: on the surface.
         judged: from when to when after contact the force is measured [s].
+        shown: and drawn.
         follows: statement of the thesis.
+        kind: class of the figure.
     """
-
-    judged: Window = JUDGED
-    follows: bool = True
-    label, limit = "RMS error outside steps [N]", LIMIT
-
-    def measure(self, record: Record) -> Tracking:
-        """Tracking error in the judged window."""
-        return tracking.tracking(*self.judged)(record)
-
-    def agrees(self, run: Tracking) -> bool:
-        """True if it follows as the thesis states."""
-        return run.follows is self.follows
-
-    def size(self, run: Tracking) -> float:
-        """Error outside the steps [N]."""
-        return run.settled
-
-    def numbers(self, data: Tracked) -> dict[str, Any]:
-        """Errors and saturation in words."""
-        limited = 100 * float(np.median([run.saturated for run in data.nominal]))
-        described = tracking.describe(data.nominal)
-        return {
-            "described": described,
-            "limited": limited,
-            "follows": FOLLOWS,
-            "following": tracking.FOLLOWING,
-        }
+    return kind(
+        number,
+        id_,
+        experiment,
+        tracking.tracking(*judged),
+        lambda run: run.follows is follows,
+        size=lambda run: float(run.settled),
+        label="RMS error outside steps [N]",
+        limit=LIMIT,
+        numbers=_numbers,
+        shown=shown,
+    )
 
 
 class Adapting(NamedTuple):
@@ -70,7 +78,7 @@ class Adapting(NamedTuple):
     adapted: list[float]  # time from which the force stays near it, one a seed [s]
 
 
-class FromTheStart(Steps):
+class FromTheStart(ForceStudy):
     """Steps judged from the first touch on, and how long adapting takes: the second of two cycles is settled."""
 
     def run(self, runs: Runs) -> Adapting:
@@ -122,18 +130,12 @@ def _pressing(experiment: Experiment, seconds: float, **changes: object) -> Expe
 
 
 FIRST = (0.0, 10.0)
-FOAM = Steps("6.11", "neural-foam-steps", _pressing(tracking.FOAM, 15.0))
-SINE = Steps("6.12", "neural-foam-sine", _pressing(tracking.FOAM, 15.0, **tracking.SINE), (9.75, 15.0))
-SLOW = Steps(
-    "6.13",
-    "neural-slow-rate.first",
-    _pressing(tracking.FOAM, 10.0, **SLOW_RATE),
-    FIRST,
-    judged=FIRST,
-    follows=False,
+FOAM = _steps("6.11", "neural-foam-steps", _pressing(tracking.FOAM, 15.0))
+SINE = _steps("6.12", "neural-foam-sine", _pressing(tracking.FOAM, 15.0, **tracking.SINE), shown=(9.75, 15.0))
+SLOW = _steps(
+    "6.13", "neural-slow-rate.first", _pressing(tracking.FOAM, 10.0, **SLOW_RATE), FIRST, FIRST, follows=False
 )
-RUBBER = Steps("6.16", "neural-rubber-steps", _pressing(tracking.RUBBER, 15.0))
-RUBBER_SINE = FromTheStart(
-    "6.17", "neural-rubber-sine", _pressing(tracking.RUBBER, 20.0, **tracking.SINE), FIRST, judged=FIRST
-)
+RUBBER = _steps("6.16", "neural-rubber-steps", _pressing(tracking.RUBBER, 15.0))
+_FROM_THE_START = _pressing(tracking.RUBBER, 20.0, **tracking.SINE)
+RUBBER_SINE = _steps("6.17", "neural-rubber-sine", _FROM_THE_START, FIRST, FIRST, kind=FromTheStart)
 STUDIES = (FOAM, SINE, SLOW, RUBBER, RUBBER_SINE)

@@ -48,6 +48,9 @@ CANDIDATES = 8
 """Best laboratories of the search that are judged over all seeds."""
 PLAUSIBLE = 0.5
 """Least fraction of the sentences that hold in a plausible laboratory: less shows one sentence against all others."""
+PLAUSIBLE_ABOUT = (
+    "Chosen for sentences that do not hold in the inferred one, and within the printed values too."
+)
 ATTEMPTS = 4
 """Tried laboratories that are judged for a sentence that does not hold in the inferred one."""
 VALUES = (0.05, 0.275, 0.5, 0.725, 0.95)
@@ -87,6 +90,10 @@ class JudgedLaboratory:
     def count_true(self, among: Iterable[Sentence]) -> int:
         """Number of sentences that hold by their claims' own rules."""
         return sum(s.is_true(self.held[s.id], len(SEEDS)) for s in among)
+
+    def count_runs(self, among: Iterable[Sentence]) -> int:
+        """Number of runs in which a sentence holds, over all of them: the margin between equal counts."""
+        return sum(self.held[s.id] for s in among)
 
 
 @dataclass(frozen=True)
@@ -169,10 +176,12 @@ class LaboratorySearch:
             while len(state.tried) < self.tries:
                 state.tried += self._try_generation(self.propose(state.tried), len(state.tried))
                 self._save(state)
-            best = [laboratory_at(point) for point in find_best(state.tried)]
-            bench, *judged = [self._judge(state, laboratory) for laboratory in (BENCH, *best)]
+            bench, *judged = [
+                JudgedLaboratory(laboratory, self._count_seeds(state, laboratory, sentences()))
+                for laboratory in (BENCH, *map(laboratory_at, find_best(state.tried)))
+            ]
             wanted = halves()["calibration" if self.half else "all"]
-            inferred = max(judged, key=lambda lab: lab.count_true(wanted))
+            inferred = max(judged, key=lambda lab: (lab.count_true(wanted), lab.count_runs(wanted)))
             plausible = self._find_plausible(state, inferred)
             sensitivity = self._find_sensitivity(inferred.laboratory)
             result = SearchResult(len(state.tried), bench, inferred, plausible, sensitivity)
@@ -219,9 +228,6 @@ class LaboratorySearch:
         finally:
             stop.set()
         return [results[number] for number in sorted(results)]
-
-    def _judge(self, state: SearchState, laboratory: Laboratory) -> JudgedLaboratory:
-        return JudgedLaboratory(laboratory, self._count_seeds(state, laboratory, sentences()))
 
     def _find_plausible(
         self, state: SearchState, inferred: JudgedLaboratory
@@ -313,10 +319,15 @@ class LaboratorySearch:
         write_json(self.folder / STATE, with_author(msgspec.to_builtins(state)))
 
     def _write(self, result: SearchResult) -> None:
-        texts = {INFERRED: laboratory_text(result.inferred.laboratory, self._about(result), self.command)}
+        inferred, head = result.inferred.laboratory, {"command": self.command}
+        true = [s.id for s in sentences() if result.inferred.count_true([s]) and not self.half]
+        text = laboratory_text(inferred, BENCH, about=self._about(result), sentences=true, **head)
+        texts = {INFERRED: text}
         for number, (laboratory, ids) in enumerate(result.plausible, 1):
-            about = "Keeps the printed values too; chosen for sentences that do not hold in the inferred one."
-            texts[f"plausible-{number}.toml"] = laboratory_text(laboratory, about, self.command, ids)
+            head["base"] = str(self.folder / INFERRED)
+            texts[f"plausible-{number}.toml"] = laboratory_text(
+                laboratory, inferred, about=PLAUSIBLE_ABOUT, sentences=ids, **head
+            )
         by_unknown = [f"{name} = {json.dumps(ids)}" for name, ids in result.sensitivity.items()]
         texts[SENSITIVITY] = "\n".join(by_unknown) + "\n"
         for name, text in texts.items():

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING
+from typing import Any, Literal
 
 import msgspec
 
@@ -16,9 +16,6 @@ from palpate_thesis.figures import fig_6_02_05 as later
 from palpate_thesis.figures import fig_6_03, fig_6_06, fig_6_10, fig_6_15
 from palpate_thesis.inference.trial import LARGEST_RATE, Trial, WatchedPress
 from palpate_thesis.neural_identifier import claims as network_claims
-
-if TYPE_CHECKING:
-    from palpate_thesis.neural_identifier.network import NetworkAnswer
 
 Holds = Callable[[Trial], bool]
 
@@ -49,12 +46,21 @@ class Sentence:
 
 
 class FigureRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A figure in halves.toml; the claims of `besides` enter no search."""
+    """A figure in halves.toml.
 
-    half: str
+    Args:
+        half: "calibration" or "validation".
+        claims: of the figure, besides those of `states` and `besides`.
+        searched: False if no search runs the figure's experiment.
+        besides: claims that enter no search.
+        states: claims that state the value of one unknown, and so calibrate in either half.
+    """
+
+    half: Literal["calibration", "validation"]
     claims: tuple[str, ...]
     searched: bool = True
     besides: tuple[str, ...] = ()
+    states: tuple[str, ...] = ()
 
 
 @cache
@@ -66,13 +72,13 @@ def sentences() -> tuple[Sentence, ...]:
         Sentence(
             claim,
             number,
-            figure.half == "calibration",
+            figure.half == "calibration" or claim in figure.states,
             figure.searched and claim not in figure.besides,
             HOLDS[claim],
             _deciding_fraction(claim),
         )
         for number, figure in figures.items()
-        for claim in (*figure.claims, *figure.besides)
+        for claim in (*figure.states, *figure.claims, *figure.besides)
     )
 
 
@@ -96,92 +102,91 @@ def _deciding_fraction(claim: str) -> float | None:
     return None if claim.startswith(by_majority) or claim.endswith((".adapts", ".sticks")) else ENOUGH
 
 
-PressHolds = Callable[[WatchedPress], bool]
+def _when_kept(name: str, holds: Callable[[Any], bool]) -> Holds:
+    """True if contact was kept in an experiment of `trial.MEASURES`, and `holds` of its result."""
+    return lambda t: t[name] is not None and holds(t[name])
 
 
-def _foam(holds: PressHolds) -> Holds:
-    return lambda t: t.foam is not None and holds(t.foam)
+def _foam(holds: Callable[[WatchedPress], bool]) -> Holds:
+    return _when_kept("foam", holds)
 
 
-def _rubber(holds: PressHolds) -> Holds:
-    return lambda t: t.rubber is not None and holds(t.rubber)
+def _rubber(holds: Callable[[WatchedPress], bool]) -> Holds:
+    return _when_kept("rubber", holds)
 
 
-def _settles_within(key: str, limit: float) -> PressHolds:
-    return lambda p: first_seconds.settles(p.estimates, key, limit)
+def _settling(figure: first_seconds.LeastSquaresFirstSeconds) -> dict[str, Holds]:
+    def settles(key: str) -> Holds:
+        return _when_kept(figure.surface, lambda p: first_seconds.settles(p.estimates, key, figure.limit))
+
+    return {f"{figure.claim}.{key}": settles(key) for key in "KBM"}
 
 
-def _level(figure: later.Later) -> PressHolds:
-    return lambda p: abs(p.estimates.K / (1e3 * figure.printed[0]) - 1.0) < later.LEVEL
+def _later(figure: later.Later) -> dict[str, Holds]:
+    """The sentences of figure 6.2 or 6.5."""
+    name, kilo = figure.surface, 1e3 * figure.printed[0]
+    return {
+        figure.claim: _when_kept(name, lambda p: figure.near(p.estimates)),
+        f"{figure.claim}.K": _when_kept(name, lambda p: abs(p.estimates.K / kilo - 1.0) < later.LEVEL),
+        f"{figure.claim}.B": _when_kept(name, lambda p: later.plausible(p.estimates)),
+        f"{figure.claim}.M": _when_kept(name, lambda p: p.estimates.M < 0.0),
+        figure.ratio: _when_kept(name, lambda p: p.spread > 1.0),
+    }
 
 
-def _network(part: network_claims.ClaimPart, answer: Callable[[Trial], NetworkAnswer | None]) -> Holds:
-    def holds(trial: Trial) -> bool:
-        networks_answer = answer(trial)
-        return networks_answer is not None and part.holds(networks_answer)
+def _network(surface: str, parts: Sequence[network_claims.ClaimPart]) -> dict[str, Holds]:
+    def holds(part: network_claims.ClaimPart) -> Holds:
+        return lambda t: (answer := t.answer(surface)) is not None and part.holds(answer)
 
-    return holds
+    return {f"network-{surface}.{part.suffix}": holds(part) for part in parts}
 
 
 def _slower(trial: Trial) -> bool:
-    answers = {rate: trial.answer_at(rate) for rate in fig_6_06.SMALLER}
+    answers = {rate: trial.answer("foam", rate) for rate in fig_6_06.SMALLER}
     by_rate = {rate: [answer] for rate, answer in answers.items() if answer is not None}
     return len(by_rate) == len(answers) and fig_6_06.slower_throughout(by_rate)[0]
 
 
 def _too_large(trial: Trial) -> bool:
-    answer = trial.answer_at(LARGEST_RATE)
+    answer = trial.answer("foam", LARGEST_RATE)
     return answer is not None and fig_6_06.stuck(answer)
 
 
 def _sticks(trial: Trial) -> bool:
-    stuck, free = trial.free_directions, trial.unstuck
+    stuck, free = trial["steps on foam"][1], trial["unstuck"]
     return stuck is not None and free is not None and 1.0 - free.y / stuck.y >= fig_6_15.SHARE
 
 
 def _free_directions(holds: Callable[[fig_6_15.Errors], bool]) -> Holds:
-    return lambda t: t.free_directions is not None and holds(t.free_directions)
-
-
-def _settling(prefix: str, limit: float, surface: Callable[[PressHolds], Holds]) -> dict[str, Holds]:
-    return {f"{prefix}.{key}": surface(_settles_within(key, limit)) for key in "KBM"}
+    return _when_kept("steps on foam", lambda result: result[1] is not None and holds(result[1]))
 
 
 HOLDS: Mapping[str, Holds] = {
-    "switch-at-5N": lambda t: all(p is not None and p.clean for p in (t.foam, t.rubber)),
-    "switch-at-5N.threshold": lambda t: t.foam is not None and not t.foam.early,
+    "switch-at-5N": lambda t: all(p is not None and p.clean for p in (t["foam"], t["rubber"])),
+    "switch-at-5N.threshold": _foam(lambda p: not p.early),
     "force-noise": _foam(lambda p: 1.5 <= p.half_range <= 2.5),
-    **_settling(first_seconds.FOAM.claim, first_seconds.FOAM.limit, _foam),
-    later.FOAM.claim: _foam(lambda p: later.FOAM.near(p.estimates)),
-    f"{later.FOAM.claim}.K": _foam(_level(later.FOAM)),
-    f"{later.FOAM.claim}.B": _foam(lambda p: later.plausible(p.estimates)),
-    f"{later.FOAM.claim}.M": _foam(lambda p: p.estimates.M < 0.0),
-    later.FOAM.ratio: _foam(lambda p: p.spread > 1.0),
+    **_settling(first_seconds.FOAM),
+    **_later(later.FOAM),
     "least-squares-raw-signals.M": _foam(lambda p: p.estimates.M_raw < 0.0),
     "least-squares-raw-signals.B": _foam(lambda p: p.estimates.B_raw < 0.0),
     "least-squares-raw-signals.K": _foam(lambda p: abs(p.estimates.apart_raw) < fig_6_03.NEAR),
     "least-squares-one-foam": _foam(lambda p: all(shows(p.estimates) for shows in fig_6_03.SHOWS.values())),
-    **_settling(first_seconds.RUBBER.claim, first_seconds.RUBBER.limit, _rubber),
-    later.RUBBER.claim: _rubber(lambda p: later.RUBBER.near(p.estimates)),
-    f"{later.RUBBER.claim}.K": _rubber(_level(later.RUBBER)),
-    f"{later.RUBBER.claim}.B": _rubber(lambda p: later.plausible(p.estimates)),
-    f"{later.RUBBER.claim}.M": _rubber(lambda p: p.estimates.M < 0.0),
-    later.RUBBER.ratio: _rubber(lambda p: p.spread > 1.0),
+    **_settling(first_seconds.RUBBER),
+    **_later(later.RUBBER),
     "network-learning-rate.slower": _slower,
     "network-learning-rate.too-large": _too_large,
-    **{f"network-foam.{p.suffix}": _network(p, lambda t: t.foam_answer) for p in network_claims.FOAM},
-    "network-foam.error": _network(network_claims.ERROR, lambda t: t.foam_answer),
-    **{f"network-rubber.{p.suffix}": _network(p, lambda t: t.rubber_answer) for p in network_claims.RUBBER},
-    "hybrid-alone-falls-short": lambda t: t.hybrid is not None and fig_6_10.misses(t.hybrid),
-    "neural-foam-steps": lambda t: t.foam_steps.follows,
-    "neural-foam-sine": lambda t: t.foam_sine.follows,
-    "neural-slow-rate.first": lambda t: not t.slow_first.follows,
-    "neural-slow-rate.later": lambda t: t.slow_later.follows,
+    **_network("foam", (*network_claims.FOAM, network_claims.ERROR)),
+    **_network("rubber", network_claims.RUBBER),
+    "hybrid-alone-falls-short": _when_kept("hybrid", fig_6_10.misses),
+    "neural-foam-steps": lambda t: t["steps on foam"][0].follows,
+    "neural-foam-sine": lambda t: t["sine on foam"].follows,
+    "neural-slow-rate.first": lambda t: not t["slow, first"].follows,
+    "neural-slow-rate.later": lambda t: t["slow, later"].follows,
     "neural-free-directions": _free_directions(fig_6_15.visible),
     "neural-free-directions.before": _free_directions(lambda e: abs(e.y_switch) > fig_6_15.VISIBLE[0]),
     "neural-free-directions.sticks": _sticks,
-    "neural-rubber-steps": lambda t: t.rubber_steps.follows,
-    "neural-rubber-sine": lambda t: t.rubber_sine[0].follows,
-    "neural-rubber-sine.adapts": lambda t: bool(2.5 <= t.rubber_sine[1] <= 7.5),
+    "neural-rubber-steps": lambda t: t["steps on rubber"].follows,
+    "neural-rubber-sine": lambda t: t["sine on rubber"][0].follows,
+    "neural-rubber-sine.adapts": lambda t: bool(2.5 <= t["sine on rubber"][1] <= 7.5),
 }
 """Each claim's own threshold, unchanged, on one run."""

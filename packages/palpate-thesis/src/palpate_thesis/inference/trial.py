@@ -1,9 +1,8 @@
 """The experiments of chapters 4 and 6 in one laboratory, each run once and only when a sentence asks for it."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TypeVar
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 from palpate.bench import Experiment, build, with_values
 from palpate.bench.summary import DONE, INTERRUPTED
@@ -12,7 +11,6 @@ from palpate_thesis.figures import fig_4_02, fig_4_04, fig_6_06, fig_6_10, fig_6
 from palpate_thesis.figures.fig_6_02_05 import by_ratios
 from palpate_thesis.figures.fig_6_11_17 import (
     FOAM,
-    JUDGED,
     RUBBER,
     RUBBER_SINE,
     SINE,
@@ -26,8 +24,6 @@ from palpate_thesis.least_squares import press_runs
 from palpate_thesis.least_squares.press_runs import PressEstimates
 from palpate_thesis.neural_identifier import network
 from palpate_thesis.neural_identifier.network import NetworkAnswer, NetworkChoice, NetworkPress
-
-T = TypeVar("T")
 
 STEPS = 5
 """Steps of the physics in a tick during a search: a quarter of those of the figures, at half the cost. They change as
@@ -54,10 +50,10 @@ class WatchedPress:
 
 @dataclass(eq=False)
 class Trial:
-    """One laboratory and one seed of the noise, with the result of each experiment; None if contact was lost.
+    """One laboratory and one seed of the noise; `trial[name]` is the result of an experiment of `MEASURES`.
 
     Args:
-        laboratory: in which the experiments run.
+        laboratory: in which the experiments run, each once and only when its result is asked for.
         seed: of the noise.
         steps: of the physics in a tick.
         stopped: polled between pieces of a run; True ends it with KeyboardInterrupt.
@@ -67,6 +63,14 @@ class Trial:
     seed: int = 0
     steps: int = STEPS
     stopped: Callable[[], bool] = lambda: False
+    _results: dict[str, Any] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Any:
+        """Result of an experiment; None if contact was lost."""
+        if name not in self._results:
+            experiment, measure = MEASURES[name]
+            self._results[name] = measure(self.record(experiment))
+        return self._results[name]
 
     def record(self, experiment: Experiment) -> Record:
         """Run an experiment up to the first loss of contact: no verdict changes after that."""
@@ -76,98 +80,20 @@ class Trial:
             raise KeyboardInterrupt
         return record
 
-    def measure(self, experiment: Experiment, measure: Callable[[Record], T]) -> T | None:
-        """`measure` of the record of an experiment; None if contact was lost."""
-        record = self.record(experiment)
-        return measure(record) if _in_one_contact(record) else None
-
     def _poll(self, _: float, __: str) -> None:
         if self.stopped():
             raise KeyboardInterrupt
 
-    @cached_property
-    def foam(self) -> WatchedPress | None:
-        """Press of figures 6.1 to 6.3, which 4.2, 4.4 and 6.6 to 6.8 use too."""
-        return self.measure(press_runs.PLAIN, lambda record: _watch_press(record, "foam"))
+    def answer(self, surface: str, rate: float = NetworkChoice().rate) -> NetworkAnswer | None:
+        """Answer of this laboratory's network on foam or on the rubber of figure 6.9; None if contact was lost."""
+        watched = self["foam" if surface == "foam" else "rubber of the network"]
+        return None if watched is None else self.answer_for(getattr(watched, "network", watched), rate)
 
-    @cached_property
-    def rubber(self) -> WatchedPress | None:
-        """Press of figures 6.4 and 6.5."""
-        return self.measure(press_runs.RUBBER, lambda record: _watch_press(record, "rubber"))
-
-    @cached_property
-    def foam_answer(self) -> NetworkAnswer | None:
-        """Answer of the network in figures 6.7 and 6.8."""
-        return self.answer_at(NetworkChoice().rate)
-
-    @cached_property
-    def rubber_answer(self) -> NetworkAnswer | None:
-        """Answer of the network in figure 6.9, on a rubber of its own."""
-        press = self.measure(network.RUBBER, lambda record: network.press_of(record, "rubber"))
-        return None if press is None else self.identifiers_answer(press)
-
-    def answer_at(self, rate: float) -> NetworkAnswer | None:
-        """Answer of the network of figure 6.6 at a learning rate."""
-        return None if self.foam is None else self.identifiers_answer(self.foam.network, rate)
-
-    def identifiers_answer(self, press: NetworkPress, rate: float = NetworkChoice().rate) -> NetworkAnswer:
+    def answer_for(self, press: NetworkPress, rate: float = NetworkChoice().rate) -> NetworkAnswer:
         """K, B and M of this laboratory's network over a press, at a learning rate."""
         lab = self.laboratory
-        return network.answer(
-            press, network.identifier_network(lab, rate), int(self.seed if lab.start is None else lab.start)
-        )
-
-    @cached_property
-    def hybrid(self) -> fig_6_10.Ends | None:
-        """Ends of the intervals under hybrid control alone: figure 6.10."""
-        return self.measure(HYBRID, fig_6_10.interval_ends)
-
-    @cached_property
-    def _foam_steps(self) -> Record:
-        return self.record(FOAM.PARAMETERS)
-
-    @cached_property
-    def foam_steps(self) -> Tracking:
-        """Force on foam that follows steps: figure 6.11."""
-        return tracking(*JUDGED)(self._foam_steps)
-
-    @cached_property
-    def free_directions(self) -> fig_6_15.Errors | None:
-        """Errors of y and angle after the last millimetres of the approach: figure 6.15."""
-        record = self._foam_steps
-        return fig_6_15.measure_free_errors(record) if _in_one_contact(record) else None
-
-    @cached_property
-    def unstuck(self) -> fig_6_15.Errors | None:
-        """Errors of y and angle without friction along the surface."""
-        return self.measure(UNSTUCK, fig_6_15.measure_free_errors)
-
-    @cached_property
-    def foam_sine(self) -> Tracking:
-        """Force on foam that follows steps and a sine: figure 6.12."""
-        return tracking(*JUDGED)(self.record(SINE.PARAMETERS))
-
-    @cached_property
-    def slow_first(self) -> Tracking:
-        """Force at a small learning rate, at first: figure 6.13."""
-        return tracking(*SLOW.judged)(self.record(SLOW.PARAMETERS))
-
-    @cached_property
-    def slow_later(self) -> Tracking:
-        """Force at a small learning rate, minutes later: figure 6.14, as long as all others together."""
-        return tracking(*fig_6_14.JUDGED)(self.record(fig_6_14.PARAMETERS))
-
-    @cached_property
-    def rubber_steps(self) -> Tracking:
-        """Force on rubber that follows steps: figure 6.16."""
-        return tracking(*JUDGED)(self.record(RUBBER.PARAMETERS))
-
-    @cached_property
-    def rubber_sine(self) -> tuple[Tracking, float]:
-        """Force on rubber from the start, and the time of adapting [s], infinite if contact was lost: figure 6.17."""
-        record = self.record(RUBBER_SINE.PARAMETERS)
-        adapted = adapted_at(away_from_settled(record)) if _in_one_contact(record) else float("inf")
-        return tracking(*RUBBER_SINE.judged)(record), adapted
+        start = int(self.seed if lab.start is None else lab.start)
+        return network.answer(press, network.identifier_network(lab, rate), start)
 
 
 def _in_one_contact(record: Record) -> bool:
@@ -193,3 +119,37 @@ def _watch_press(record: Record, surface: str) -> WatchedPress:
         fig_4_04.half_ranges(record)[0],
         network.cut(network.press_of(record, surface), network.PRESS),
     )
+
+
+Measure = Callable[[Record], Any]
+
+
+def _unbroken(measure: Measure) -> Measure:
+    """`measure` of a record without a loss of contact; None of another."""
+    return lambda record: measure(record) if _in_one_contact(record) else None
+
+
+def _steps_on_foam(record: Record) -> tuple[Tracking, fig_6_15.Errors | None]:
+    return FOAM.measure(record), _unbroken(fig_6_15.measure_free_errors)(record)
+
+
+def _sine_on_rubber(record: Record) -> tuple[Tracking, float]:
+    """Tracking, and the time of adapting [s], infinite if contact was lost."""
+    adapted = _unbroken(lambda r: adapted_at(away_from_settled(r)))(record)
+    return RUBBER_SINE.measure(record), float("inf") if adapted is None else adapted
+
+
+MEASURES: Mapping[str, tuple[Experiment, Measure]] = {
+    "foam": (press_runs.PLAIN, _unbroken(lambda r: _watch_press(r, "foam"))),
+    "rubber": (press_runs.RUBBER, _unbroken(lambda r: _watch_press(r, "rubber"))),
+    "rubber of the network": (network.RUBBER, _unbroken(lambda r: network.press_of(r, "rubber"))),
+    "hybrid": (HYBRID, _unbroken(fig_6_10.interval_ends)),
+    "steps on foam": (FOAM.PARAMETERS, _steps_on_foam),
+    "unstuck": (UNSTUCK, _unbroken(fig_6_15.measure_free_errors)),
+    "sine on foam": (SINE.PARAMETERS, SINE.measure),
+    "slow, first": (SLOW.PARAMETERS, SLOW.measure),
+    "slow, later": (fig_6_14.PARAMETERS, tracking(*fig_6_14.JUDGED)),
+    "steps on rubber": (RUBBER.PARAMETERS, RUBBER.measure),
+    "sine on rubber": (RUBBER_SINE.PARAMETERS, _sine_on_rubber),
+}
+"""Experiments by name, and the function that measures each; "slow, later" takes as long as all others together."""

@@ -12,7 +12,7 @@ from palpate_thesis.drawing import panels as rows_of_panels
 from palpate_thesis.least_squares import press_runs
 from palpate_thesis.least_squares.press_runs import PressEstimates, between
 
-COLORS = {"plain foam": style.SERIES[0], "relaxing foam": style.SERIES[1], "rubber": style.SERIES[2]}
+COLORS = {"foam": style.SERIES[0], "relaxing foam": style.SERIES[1], "rubber": style.SERIES[2]}
 PARAMETERS = {"M": ("$M_e$ [kg]", 1.0), "B": ("$B_e$ [N s/m]", 1.0), "K": ("$K_e$ [kN/m]", 1e-3)}
 NAMES = {
     "Force": "f [N]",
@@ -37,36 +37,27 @@ def set_title(axis: Axes, letter: str, text: str) -> None:
     axis.set_title(f"({letter}) {text}")
 
 
-def six(axes: list[Axes], presses: Mapping[str, Record], front: str, slot: tuple[float, float]) -> None:
-    """Draw force, displacement, their ratio, and M, B, K of one front-end, with a line for each surface.
+def six(axes: list[Axes], name: str, press: Record, front: str, slot: tuple[float, float]) -> None:
+    """Draw force, displacement, their ratio, and M, B, K of one front-end on the surface of this name.
 
     The thesis' letters, in its order read down the columns: (a)-(c) left, (d)-(f) right.
     """
     left, right = axes[0:6:2], axes[1:6:2]
-    for axis, letter, (name, label) in zip((*left, *right), "abcdef", NAMES.items(), strict=True):
-        set_title(axis, letter, name)
+    for axis, letter, (title, label) in zip((*left, *right), "abcdef", NAMES.items(), strict=True):
+        set_title(axis, letter, title)
         axis.set(ylabel=label, xlim=slot)
-    for name, press in presses.items():
-        _lines(left, right, press, front, slot, name)
-    for axis in (left[2], right[2]):
-        axis.set_xlabel("time since 5 N [s]")
-    if len(presses) > 1:
-        style.legend(left[0])
-
-
-def _lines(
-    left: list[Axes], right: list[Axes], press: Record, front: str, slot: tuple[float, float], name: str
-) -> None:
     rows = between(press, *slot)
     t, color = press["t"][rows], COLORS[name]
     x = press["displacement"][rows]
     force = press["force_sampled" if front == "raw" else "force_measured"][rows]
     far = np.where(np.abs(x) > 2e-5, x, np.nan)
-    left[0].plot(t, force, color=color, linewidth=0.7, label=name)
+    left[0].plot(t, force, color=color, linewidth=0.7)
     left[1].plot(t, 1e3 * x, color=color, linewidth=1.1)
     left[2].plot(t, 1e-3 * force / far, color=color, linewidth=0.7)
     for axis, (key, (_, scale)) in zip(right, PARAMETERS.items(), strict=True):
         axis.plot(t, scale * press[f"{key}_{front}"][rows], color=color, linewidth=1.1)
+    for axis in (left[2], right[2]):
+        axis.set_xlabel("time since 5 N [s]")
 
 
 def settling(presses: Mapping[str, Sequence[PressEstimates]], limit: float) -> Figure:

@@ -1,7 +1,7 @@
 """Presses for the least-squares figures, their estimates, and varied conditions."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -9,9 +9,7 @@ from palpate.arrays import Array, Mask
 from palpate.bench import Experiment, load, with_values
 from palpate.bench.summary import CONTACT
 from palpate.records import Record
-from palpate_thesis.runs import NEAREST_WALL, VARIED_SEEDS, Runs, move_wall, rougher
-
-T = TypeVar("T")
+from palpate_thesis.runs import NEAREST_WALL, move_wall, rougher
 
 PRESS = 8.0
 """Seconds of contact: the first four as in figures 6.1, 6.3 and 6.4, and the slot of 6.2 and 6.5."""
@@ -42,7 +40,6 @@ PLAIN = nearer(with_values(load("foam-rls"), {"run.press": PRESS, "surface.stiff
 """Foam without memory. Its K is chosen so that f/x comes out at the thesis' 6.8 kN/m."""
 RELAXING = nearer(with_values(load("foam-viscoelastic"), {"run.press": PRESS}))
 RUBBER = nearer(with_values(load("rubber-rls"), {"run.press": PRESS}))
-FOAMS = {"plain foam": PLAIN, "relaxing foam": RELAXING}
 COLUMNS = (
     *("t", "force", "force_sampled", "force_measured", "displacement", "x", "x_measured"),
     *("vx_raw", "ax_raw", "ax_measured", "penetration"),
@@ -72,9 +69,9 @@ def at(press: Record, column: str, time: float) -> float:
     return float(press[column][i]) if i < len(press) else float("nan")
 
 
-def ratio(press: Record, slot: tuple[float, float] = SLOT) -> float:
-    """Mean force over mean displacement in a time slot [N/m]: the thesis' "f/x"."""
-    inside = between(press, *slot)
+def ratio(press: Record) -> float:
+    """Mean force over mean displacement in the later slot [N/m]: the thesis' "f/x"."""
+    inside = between(press, *SLOT)
     if not inside.any():
         return float("nan")
     return float(press["force_measured"][inside].mean() / press["displacement"][inside].mean())
@@ -100,32 +97,6 @@ def _within_after(values: Array, band: float, scale: float, tick: float) -> floa
     return (float(outside[-1]) + 1.0) * tick if len(outside) else 0.0
 
 
-def trajectory(phi: Array, y: Array, start: Sequence[float], covariance: Sequence[float]) -> Array:
-    """Estimates of recursive least squares without forgetting after each sample, shape (k, 3).
-
-    Not by recursion but as running batch solutions of (5.5), which for any P(0) it must equal: one run of the bench
-    serves every P(0) and start.
-
-    Args:
-        phi: regressors, shape (k, 3).
-        y: force [N], shape (k,).
-        start: theta(0).
-        covariance: the diagonal of P(0).
-    """
-    scale = np.sqrt((phi**2).sum(axis=0)) + 1e-30
-    unit = phi / scale
-    prior = np.diag(1.0 / (np.asarray(covariance) * scale**2))
-    information = prior + np.cumsum(unit[:, :, None] * unit[:, None, :], axis=0)
-    right = prior @ (np.asarray(start) * scale) + np.cumsum(unit * y[:, None], axis=0)
-    return np.linalg.solve(information, right[:, :, None])[:, :, 0] / scale
-
-
-def thesis_signals(press: Record) -> tuple[Array, Array]:
-    """Regressor (a, v, x) and force of the thesis' estimator."""
-    phi = np.column_stack([press["ax_measured"], press["vx_raw"], press["displacement"]])
-    return phi, press["force_measured"]
-
-
 def conditions(experiment: Experiment) -> dict[str, Experiment]:
     """Variations of one unstated parameter at a time: friction, pose, the surface's B and M."""
     surface = experiment.surface
@@ -136,7 +107,6 @@ def conditions(experiment: Experiment) -> dict[str, Experiment]:
         "wall at 0.49 m": move_wall(experiment, 0.49),
         "B halved": {"surface.damping": 0.5 * surface.damping},
         "B doubled": {"surface.damping": 2.0 * surface.damping},
-        "M = 0": {"surface.mass": 0.0},
         "M = 0.5 kg": {"surface.mass": 0.5},
     }
     return {name: with_values(experiment, changes) for name, changes in by.items()}
@@ -155,7 +125,6 @@ class PressEstimates(NamedTuple):
     settled_M: float  # [s]
     settled_B: float
     settled_K: float
-    early_apart: float  # relative difference of K at 4 s and f/x of the second before
     true_B: float  # damping of the surface: see `own_damping` [N s/m]
 
     @property
@@ -178,29 +147,9 @@ def press_estimates(record: Record) -> PressEstimates:
     settled = {f"settled_{name}": settled_after(press[f"{name}_thesis"]) for name in "BK"}
     settled["settled_M"] = mass_settled_after(press["M_thesis"])
     damping = own_damping(record.meta["experiment"]["surface"])
-    early = at(press, "K_thesis", FIRST) / ratio(press, (FIRST - 1.0, FIRST)) - 1.0
-    return PressEstimates(ratio(press), **values, **raw, **settled, early_apart=early, true_B=damping)
-
-
-def sweep(runs: Runs, experiments: Mapping[str, Experiment]) -> dict[str, list[PressEstimates]]:
-    """Estimates of the presses of each experiment, over the first few seeds."""
-    return runs.by_name(experiments, press_estimates, VARIED_SEEDS)
+    return PressEstimates(ratio(press), **values, **raw, **settled, true_B=damping)
 
 
 def median(values: Sequence[float] | Array) -> float:
     """Median of the values that are numbers."""
     return float(np.nanmedian(np.asarray(values, dtype=float)))
-
-
-def failing(results: Mapping[str, Sequence[T]], holds: Callable[[T], bool]) -> list[str]:
-    """Names of the varied conditions under which a claim does not hold for most of the seeds."""
-    return [name for name, presses in results.items() if 2 * sum(map(holds, presses)) <= len(presses)]
-
-
-def where_it_fails(fails: Sequence[str], among: int) -> str:
-    """Sentence with the varied conditions under which a claim does not hold."""
-    if not fails:
-        return f"It holds under all {among} varied conditions (friction, pose, the surface's M and B)."
-    if len(fails) == among:
-        return f"It holds under none of the {among} varied conditions."
-    return f"Of {among} varied conditions it does not hold with: {', '.join(fails)}."

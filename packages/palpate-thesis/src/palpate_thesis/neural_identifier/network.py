@@ -1,7 +1,6 @@
 """Presses for the neural identifier, networks that learn from them, and their answers."""
 
-from collections.abc import Mapping, Sequence
-from itertools import product
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,17 +24,8 @@ RUBBER = press_runs.nearer(
     with_values(load("rubber-rls"), {"run.press": PRESS, "surface.stiffness": 49200.0})
 )
 """A rubber of its own: f/x is 62 kN/m in this run of the thesis and 44 in the one for least squares."""
-RELAXING = press_runs.nearer(with_values(load("foam-viscoelastic"), {"run.press": PRESS}))
-STIFFENING = {
-    "foam": {"kind": "hunt-crossley", "stiffness": 5.6e5, "damping": 1e7, "exponent": 2.0, "mass": 0.1},
-    "rubber": {"kind": "hunt-crossley", "stiffness": 4.8e7, "damping": 1.9e9, "exponent": 2.0, "mass": 0.05},
-}
-"""Surfaces whose force grows with the square of the depth: from 5 to 20 N over the same way as the linear ones."""
-
 STARTS = tuple(range(10))
 """Seeds of the weights at the start; all are tried on the press of every noise seed."""
-VARIED_NOISE, VARIED_STARTS = 2, 10
-"""Noise seeds and starts for each varied condition."""
 MEAN_OVER = 0.05
 """Length of the running mean under which an error is looked at: what is left is no noise [s]."""
 GONE = 1.0
@@ -84,12 +74,9 @@ def cut(press: NetworkPress, seconds: float) -> NetworkPress:
     return NetworkPress(press.surface, inputs, force, ratio, press.squares[:n])
 
 
-def presses(
-    runs: Runs, experiment: Experiment, surface: str, seeds: Sequence[int] | None = None
-) -> list[NetworkPress]:
+def presses(runs: Runs, experiment: Experiment, surface: str) -> list[NetworkPress]:
     """One press a noise seed."""
-    cases = [(experiment, seed) for seed in (runs.seeds if seeds is None else seeds)]
-    return runs.over(cases, lambda record: press_of(record, surface))
+    return runs.over_seeds(experiment, lambda record: press_of(record, surface))
 
 
 class NetworkChoice(NamedTuple):
@@ -130,26 +117,37 @@ def starts(runs: Runs) -> tuple[int, ...]:
     return STARTS if runs.laboratory.start is None else (int(runs.laboratory.start),)
 
 
-AMPLITUDES = (22.0, 25.0, 30.0, 40.0, 60.0, 100.0, 200.0)
-WEIGHTS = (0.01, 0.1, 0.5, 1.0, 2.0)
-SWEEP = [NetworkChoice(a, w, t) for t, a, w in product((True, False), AMPLITUDES, WEIGHTS)]
+class Coefficients(NamedTuple):
+    """K, B and M of a method along a press: means over the last half second, and settling times."""
+
+    K: float  # [N/m]
+    B: float  # [N s/m]
+    M: float  # [kg]
+    settled_K: float  # time from which it stays within 10 % of its last value [s]
+    settled_B: float
+    settled_M: float  # within 10 % of its largest value: see `mass_settled_after`
+
+
+def coefficients(curve: Array) -> Coefficients:
+    """Values and settling times of K, B, M along a press, shape (n, 3)."""
+    end = len(curve) * TICK
+    k, b = (press_runs.settled_after(values, end) for values in curve.T[:2])
+    K, B, M = map(float, curve[-round(LATE / TICK) :].mean(axis=0))
+    return Coefficients(K, B, M, k, b, press_runs.mass_settled_after(curve[:, 2], end))
 
 
 class NetworkAnswer(NamedTuple):
-    """Answer of one network after one press: averages over the last half second."""
+    """Answer of one network after one press."""
 
-    K: float
+    K: float  # these six as in `Coefficients`
     B: float
     M: float
-    ratio: float  # f/x of the press [N/m]
-    squares_B: float  # least squares' B of the same press [N s/m]
-    settled_K: float  # from when on within 10 % of the value at 4 s [s]
+    settled_K: float
     settled_B: float
     settled_M: float
+    ratio: float  # f/x of the press [N/m]
+    squares_B: float  # least squares' B of the same press [N s/m]
     error_gone: float  # from when on the mean error of the output is within GONE [s]; infinite: never
-    at_zero: float  # what the network says where nothing is pressed and nothing moves [N]
-    tangent: float  # slope of its force at the displacement that it rests at [N/m]
-    outside: bool  # whether the probe was warned of
 
     @property
     def over(self) -> float:
@@ -159,15 +157,9 @@ class NetworkAnswer(NamedTuple):
 
 def answer(press: NetworkPress, choice: NetworkChoice, start: int) -> NetworkAnswer:
     """Lets one network learn from one press."""
-    probe, answers = learn(press, choice, start)
-    K, B, M = map(float, answers[-round(LATE / TICK) :, :3].mean(axis=0))
-    end = len(answers) * TICK
-    k, b = (press_runs.settled_after(a, end) for a in answers[:, :2].T)
-    m = press_runs.mass_settled_after(answers[:, 2], end)
-    probed = probe.probe()
-    last = probed.force_at_zero, tangent(probe, press.rest), bool(probed.warnings)
-    squares_B, gone = float(press.squares[-1, 1]), error_gone(answers[:, 3])
-    return NetworkAnswer(K, B, M, press.ratio, squares_B, k, b, m, gone, *last)
+    _, curve = learn(press, choice, start)
+    gone, squares_B = error_gone(curve[:, 3]), float(press.squares[-1, 1])
+    return NetworkAnswer(*coefficients(curve[:, :3]), press.ratio, squares_B, gone)
 
 
 def tangent(probe: NeuralProbe, x: float) -> float:
@@ -193,43 +185,7 @@ def error_gone(error: Array) -> float:
     return float("inf") if large[-1] == len(error) - 1 else float((large[-1] + 1) * TICK)
 
 
-def answers(
-    runs: Runs, contacts: Sequence[NetworkPress], choice: NetworkChoice, from_: Sequence[int] | None = None
-) -> list[NetworkAnswer]:
+def answers(runs: Runs, contacts: Sequence[NetworkPress], choice: NetworkChoice) -> list[NetworkAnswer]:
     """Every start on every press."""
-    cases = [
-        (press, choice, start) for press in contacts for start in (starts(runs) if from_ is None else from_)
-    ]
+    cases = [(press, choice, start) for press in contacts for start in starts(runs)]
     return runs.map(lambda case: answer(*case), cases)
-
-
-def sweep(
-    runs: Runs, contacts: Sequence[NetworkPress], choices: Sequence[NetworkChoice] = tuple(SWEEP)
-) -> dict[NetworkChoice, list[NetworkAnswer]]:
-    """For each choice as many answers as there are presses, each of them with a start of its own if there are many."""
-    own_starts = starts(runs)
-    first = [(press, i if len(own_starts) > 1 else own_starts[0]) for i, press in enumerate(contacts)]
-    cases = {choice: [(press, choice, start) for press, start in first] for choice in choices}
-    return runs.map_each(lambda case: answer(*case), cases)
-
-
-def conditions(experiment: Experiment) -> dict[str, Experiment]:
-    """Variations of one other unstated parameter at a time: friction, pose, and the surface's B, M and law."""
-    kind = "foam" if experiment.surface == FOAM.surface else "rubber"
-    cases = press_runs.conditions(experiment)
-    cases["stiffening"] = with_values(experiment, {"surface": STIFFENING[kind]})
-    return cases | ({"relaxing": RELAXING} if kind == "foam" else {})
-
-
-def answers_under_conditions(
-    runs: Runs, experiment: Experiment, surface: str
-) -> dict[str, list[NetworkAnswer]]:
-    """Answers of networks as chosen under each condition."""
-    varied = varied_presses(runs, experiment, surface)
-    few_starts = starts(runs)[:VARIED_STARTS]
-    return {name: answers(runs, few, chosen_network(runs), few_starts) for name, few in varied.items()}
-
-
-def varied_presses(runs: Runs, experiment: Experiment, surface: str) -> Mapping[str, list[NetworkPress]]:
-    """The presses of each condition, for a few noise seeds."""
-    return runs.by_name(conditions(experiment), lambda record: press_of(record, surface), VARIED_NOISE)

@@ -42,12 +42,12 @@ class SharedPress(NamedTuple):
 class Identified(NamedTuple):
     """Answer of one method on one press: means over the last half second."""
 
-    K: float  # [N/m]
-    B: float  # [N s/m]
-    M: float  # [kg]
-    settled_K: float  # time from which it stays within 10 % of its last value [s]
+    K: float  # these six as in `network.Coefficients`
+    B: float
+    M: float
+    settled_K: float
     settled_B: float
-    settled_M: float  # within 10 % of its largest value: see `mass_settled_after`
+    settled_M: float
     ripple: float  # standard deviation of K in the last half second, relative to K
     ratio: float  # f/x of the press [N/m]
     truth: Array  # K, B, M of the surface, shape (3,)
@@ -162,13 +162,9 @@ def shared_press(record: Record, surface: str) -> SharedPress:
 
 def identified(shared: SharedPress, curve: Array) -> Identified:
     """Answer of a method from its K, B, M along a press, shape (n, 3)."""
-    late = curve[-round(network.LATE / network.TICK) :]
-    K, B, M = map(float, late.mean(axis=0))
-    end = len(curve) * network.TICK
-    k, b = (press_runs.settled_after(values, end) for values in curve.T[:2])
-    m = press_runs.mass_settled_after(curve[:, 2], end)
-    ripple = float(late[:, 0].std() / abs(K))
-    return Identified(K, B, M, k, b, m, ripple, shared.press.ratio, shared.truth)
+    late = curve[-round(network.LATE / network.TICK) :, 0]
+    ripple = float(late.std() / abs(late.mean()))
+    return Identified(*network.coefficients(curve), ripple, shared.press.ratio, shared.truth)
 
 
 def fraction(flags: Sequence[bool]) -> str:
