@@ -1,6 +1,7 @@
 """Any serial arm for use outside a control loop: arrays in, arrays out."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -8,7 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import ArrayLike
 
-from palpate._jit import kernel, law, part
+from palpate._jit import BoundKernel, kernel, law, part
 from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.arrays import Array, Counts
 from palpate.errors import InputError
@@ -237,6 +238,11 @@ class SerialArm(Readable):
         """J, velocity of the tip [m/s] above its turning [rad/s] by joint rates, shape (6, n)."""
         return self._state_at(q).room.J
 
+    def pose_and_jacobian(self, q: ArrayLike) -> tuple[Array, Array]:
+        """Pose of the tip, shape (4, 4), and J, shape (6, n), in one evaluation."""
+        state = self._state_at(q)
+        return state.pose, state.room.J
+
     def jacobian_dot(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """dJ/dt, shape (6, n)."""
         return self._state_at(q, qd).Jdot
@@ -289,10 +295,18 @@ class SerialArm(Readable):
             )
         return array
 
+    @cached_property
+    def _describe(self) -> BoundKernel:
+        """The compiled description, bound to the types of this arm's chain."""
+        return BoundKernel(compiled_description)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_describe"}
+
     def _state_at(self, q: ArrayLike, qd: ArrayLike | None = None) -> ArmState:
         rates = np.zeros(self.joints) if qd is None else self._check(qd, "qd")
         state = arm_state_for(self.joints)
-        compiled_description(self.chain, self._check(q, "q"), rates, state)
+        self._describe(self.chain, self._check(q, "q"), rates, state)
         return state
 
 
