@@ -140,10 +140,9 @@ def _row(arm: SimulatedArm, place: Place, tick: Tick, touch: TipSample | None, t
     displacement = tip[0] - float(place.normal @ touch.position) if touch is not None and pressing else 0.0
     known = [truth.force, reading, reading, tick.desired * pressing]
     state = [truth.depth, float(truth.touching), displacement, action.bound]
-    return np.hstack(
-        ((time, action.phase), truth.q, truth.qd, true, tip, action.speed, known)
-        + (truth.torque, truth.saturated, state)
-    )
+    about = (time, action.phase)
+    parts = (about, truth.q, truth.qd, true, tip, action.speed, known, truth.torque, truth.saturated, state)
+    return np.hstack(parts)
 
 
 def _judge(
