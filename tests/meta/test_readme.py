@@ -43,7 +43,7 @@ def commands(root, page: str, first: str) -> list[str]:
 
 def test_the_readme_shows_the_program(root):
     shown = " ".join(commands(root, "README.md", "palpate"))
-    assert all(word in shown for word in ("identify", "run", "speed"))
+    assert all(word in shown for word in ("identify", "run", "tune", "certify"))
     assert "make demo" in commands(root, "README.md", "make")
 
 

@@ -184,7 +184,9 @@ def markdown(scores: list[Score]) -> str:
         scores: of at least one log.
     """
     every = tables(scores)
-    told = [line for line in summary(scores) if not line.startswith(("seconds", "  ")) and "not given" not in line]
+    told = [
+        line for line in summary(scores) if not line.startswith(("seconds", "  ")) and "not given" not in line
+    ]
     low = flagged(every["surface x nuisance"])
     told.append(
         f"cells with {ENOUGH} answers or more of which fewer than {LEAST:.0%} hold: {', '.join(low) or 'none'}"
