@@ -169,6 +169,35 @@ def test_the_readme_shows_in_the_checkout():
     assert sum(path.stat().st_size for path in pictures) < 1_000_000
 
 
+PICTURED = {
+    "identify": ("identify press.csv --report page.html",),
+    "tune": (
+        "identify press.csv --json",
+        "tune found.json --arm ur5e --force 15 --out gains.toml --report page.html",
+    ),
+}
+"""Commands that made the page of a picture, as `make pictures` runs them."""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", PICTURED)
+def test_a_picture_shows_the_numbers_that_the_program_prints(name, capsys, monkeypatch, tmp_path):
+    from PIL import Image
+
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(ROOT / "examples/data/press.csv", tmp_path)
+    named = ["--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N"]
+    for line in PICTURED[name]:
+        words = line.split()
+        main([*words, *(named if words[0] == "identify" else [])])
+        (tmp_path / "found.json").write_text(capsys.readouterr().out)
+    with Image.open(ROOT / "docs" / f"{name}.png") as image:
+        shown = re.findall(r"\d[\d.]*(?: ± [\d.]+)? [A-Za-z/]+", image.text["Description"])
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert len(shown) > 5
+    assert not [quantity for quantity in shown if quantity not in page], "make pictures"
+
+
 KINDS = {".c", ".css", ".html", ".js", ".md", ".py", ".svg", ".toml", ".yaml", ".yml"}
 
 
