@@ -128,22 +128,6 @@ def test_toml_of_the_pages_is_toml(page):
         assert tomllib.loads(text), f"{page}: {text}"
 
 
-@pytest.mark.parametrize("line", ["palpate run --list"])
-def test_cheap_commands_of_the_readme_run(root, capsys, line):
-    assert line in commands(root, "README.md", "palpate")
-    assert main(shlex.split(line)[1:]) == 0
-    assert "foam-hybrid" in capsys.readouterr().out
-
-
-def test_the_log_of_the_readme_is_identified(root, capsys, monkeypatch, tmp_path):
-    (line,) = {line for line in commands(root, "README.md", "palpate") if "identify examples" in line}
-    words = shlex.split(line)[1:]
-    words[1] = str(root / words[1])
-    monkeypatch.chdir(tmp_path)
-    assert main(words) in {0, 1}
-    assert "K" in capsys.readouterr().out
-
-
 def test_the_readme_shows_what_the_demo_prints(program, root, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     (shown,) = blocks(root, "README.md", "text")

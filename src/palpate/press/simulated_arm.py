@@ -210,8 +210,8 @@ class SimulatedArm:
     def _follow(self) -> Array:
         """Set-points of the motors that follow the goal, by the smallest joint rates."""
         q, tick = self._setpoint, self.loop.tick
-        pose, J = self.arm.pose_and_jacobian(q)
-        error = pose_error(pose, self._goal)
+        J = self.arm.jacobian(q)
+        error = pose_error(self.arm.forward_kinematics(q), self._goal)
         step = J.T @ np.linalg.solve(J @ J.T, error)
         self._setpoint = q + np.clip(step, -tick * self.arm.speed, tick * self.arm.speed)
         return self._setpoint

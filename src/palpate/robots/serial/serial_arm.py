@@ -238,11 +238,6 @@ class SerialArm(Readable):
         """J, velocity of the tip [m/s] above its turning [rad/s] by joint rates, shape (6, n)."""
         return self._state_at(q).room.J
 
-    def pose_and_jacobian(self, q: ArrayLike) -> tuple[Array, Array]:
-        """Pose of the tip, shape (4, 4), and J, shape (6, n), in one evaluation."""
-        state = self._state_at(q)
-        return state.pose, state.room.J
-
     def jacobian_dot(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """dJ/dt, shape (6, n)."""
         return self._state_at(q, qd).Jdot
