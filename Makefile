@@ -93,7 +93,7 @@ docs: .venv/dev.stamp ## build the documentation into site/
 	$(BIN)/zensical build --clean --strict
 
 pictures: .venv/dev.stamp ## make the film and the pictures of the README again; a Chromium takes them
-	$(BIN)/palpate run foam-rls --seed 1 --out build/foam-rls --replace
+	$(BIN)/palpate run foam-rls --seed 1 --figures png --out build/foam-rls --replace
 	cp build/foam-rls/identification.png docs/foam-rls.png
 	$(BIN)/python benchmarks/pictures.py
 

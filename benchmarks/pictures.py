@@ -10,6 +10,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 from playwright.sync_api import Page, sync_playwright
 
 ROOT = Path(__file__).parents[1]
@@ -31,10 +33,14 @@ def palpate(folder: Path, *words: str) -> str:
 
 
 def picture(page: Page, address: str, path: Path, seconds: float) -> None:
-    """The top of a page, after some seconds."""
+    """The top of a page, after some seconds; its headings stand in the file, for a test to compare."""
     page.goto(address)
     page.wait_for_timeout(1e3 * seconds)
     page.screenshot(path=path, clip={"x": 0, "y": 0, "width": WIDTH, "height": HEIGHT})
+    words = PngInfo()
+    words.add_itxt("Description", " ".join(page.locator("h1, h1 ~ p, .sentence").all_inner_texts()))
+    with Image.open(path) as image:
+        image.save(path, pnginfo=words, optimize=True)
     print(f"{path.name}: {path.stat().st_size // 1024} kB")
 
 

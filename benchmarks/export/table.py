@@ -33,11 +33,9 @@ def main() -> None:
 
 def measured(folder: Path) -> Iterator[tuple[str, ...]]:
     """A row for each press."""
-    for mass in (0.5, 2.0, 8.0):
-        for joint, name in ((scenes.SLIDE, "slide joint"), (scenes.FREE, "free joint")):
-            yield row(
-                folder, "mujoco", f"sphere of {mass:g} kg, {name}", scenes.mjcf(folder, joint, mass=mass)
-            )
+    slide, free = (scenes.SLIDE, "slide joint"), (scenes.FREE, "free joint")
+    for mass, (joint, name) in ((0.5, slide), (2.0, free), (8.0, slide)):
+        yield row(folder, "mujoco", f"sphere of {mass:g} kg, {name}", scenes.mjcf(folder, joint, mass=mass))
     pyramid = 'cone="pyramidal" timestep="0.001"'
     yield row(folder, "mujoco", "the same of 2 kg, pyramidal cone", scenes.mjcf(folder, options=pyramid))
     yield row(
@@ -47,7 +45,7 @@ def measured(folder: Path) -> Iterator[tuple[str, ...]]:
         yield row(folder, "mujoco", f"sphere at the tip of {arm}", scenes.arm_mjcf(folder, arm))
     for K, B in ((300.0, 5.0), (1e5, 300.0)):
         yield row(folder, "mujoco", "sphere of 2 kg, slide joint", scenes.mjcf(folder), K, B)
-    for mass in (0.5, 2.0, 8.0):
+    for mass in (0.5, 8.0):
         yield row(folder, "drake", f"sphere of {mass:g} kg, SDF", scenes.sdf(folder, mass))
     yield row(folder, "drake", "sphere of 2 kg, URDF", scenes.urdf(folder))
     yield row(folder, "mjcf-spring", "the joint of the plate", None)

@@ -107,12 +107,10 @@ def main() -> None:
     cells = [cell for cell in product(SURFACES, POSITIONS, SENSORS) if not asked.only or asked.only in cell]
     for number, (surface, position, sensor) in enumerate(cells):
         made = stream(1000 * asked.first + 7 * number, surface, position, sensor)
-        for name in ("all", surface, position, sensor):
-            tallies.setdefault(name, Tally())
         own = Tally()
         own.add(made)
-        for name in ("all", surface, position, sensor):
-            tallies[name].n.update(own.n)
+        for name in ("all", surface):
+            tallies.setdefault(name, Tally()).n.update(own.n)
     if not asked.only:
         for number in range(10):
             made = stream(

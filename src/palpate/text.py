@@ -21,6 +21,8 @@ _UNSAFE = {
     "Zp",
 }  # controls, formats (they turn the direction of a line), halves of letters
 _GAP = " ... "
+_LAST_PART, _FIRST_PART = re.compile(r"\s\S{0,30}$"), re.compile(r"^\S{0,30}\s")
+"""The part of a word at the cut, which is left out; a longer word, such as a path, is cut."""
 _KEPT = "\n\t\u200c\u200d"  # the last two join letters of several scripts
 
 
@@ -69,7 +71,8 @@ def shorten(text: str, most: int) -> str:
     if len(text) <= most:
         return text
     letters = most - len(_GAP)
-    return text[: letters - letters // 3] + _GAP + text[-(letters // 3) :]
+    begin, end = text[: letters - letters // 3], text[-(letters // 3) :]
+    return _LAST_PART.sub("", begin) + _GAP + _FIRST_PART.sub("", end)
 
 
 def print_hanging(lines: Iterable[Text], console: Console) -> None:

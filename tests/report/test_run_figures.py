@@ -20,7 +20,7 @@ def summary(record):
 
 
 def write(record, summary, folder):
-    return write_report(record, summary, None, "the experiment's file", folder)
+    return write_report(record, summary, None, "the experiment's file", folder, (".png",))
 
 
 def pixels(path):

@@ -39,7 +39,8 @@ def run(
 
     palpate run foam-hybrid --seed 1 --out runs/foam
 
-    The folder holds record.parquet, summary.json, figures and report.html; the default is runs/NAME-SEED.
+    The folder holds record.parquet, summary.json and report.html, which shows the charts; the default is
+    runs/NAME-SEED.
 
     Parameters
     ----------

@@ -138,19 +138,11 @@ def _row(arm: SimulatedArm, place: Place, tick: Tick, touch: TipSample | None, t
     true = place.axes @ arm.arm.forward_kinematics(truth.q)[:3, 3] if np.isfinite(truth.q).all() else tip
     reading = float(place.normal @ force)
     displacement = tip[0] - float(place.normal @ touch.position) if touch is not None and pressing else 0.0
-    numbers = [
-        [time, action.phase],
-        truth.q,
-        truth.qd,
-        true,
-        tip,
-        [action.speed],
-        [truth.force, reading, reading, tick.desired * pressing],
-        truth.torque,
-        truth.saturated,
-        [truth.depth, float(truth.touching), displacement, action.bound],
-    ]
-    return np.concatenate([np.asarray(part, dtype=float) for part in numbers])
+    known = [truth.force, reading, reading, tick.desired * pressing]
+    state = [truth.depth, float(truth.touching), displacement, action.bound]
+    about = (time, action.phase)
+    parts = (about, truth.q, truth.qd, true, tip, action.speed, known, truth.torque, truth.saturated, state)
+    return np.hstack(parts)
 
 
 def _judge(

@@ -184,7 +184,9 @@ def markdown(scores: list[Score]) -> str:
         scores: of at least one log.
     """
     every = tables(scores)
-    told = [line for line in summary(scores) if not line.startswith("seconds")]  # no second run has the same
+    told = [
+        line for line in summary(scores) if not line.startswith(("seconds", "  ")) and "not given" not in line
+    ]
     low = flagged(every["surface x nuisance"])
     told.append(
         f"cells with {ENOUGH} answers or more of which fewer than {LEAST:.0%} hold: {', '.join(low) or 'none'}"
@@ -193,14 +195,9 @@ def markdown(scores: list[Score]) -> str:
 
 
 def _markdown(rows: list[dict[str, Any]]) -> str:
-    columns = ("K", "B", "M", "apparent", WORKING_POINT)
-    lines = [f"| nuisance, surface | logs | {' | '.join(columns)} | K width |", "|---" * 8 + "|"]
+    columns = ("K", "apparent", WORKING_POINT)
+    lines = [f"| nuisance, surface | logs | {' | '.join(columns)} |", "|---" * 5 + "|"]
     for figures in rows:
-        cells = [
-            figures["name"],
-            str(figures["logs"]),
-            *(_three(figures[c]) for c in columns),
-            _short(figures["K"]["width"]),
-        ]
+        cells = [figures["name"], str(figures["logs"]), *(_three(figures[c]) for c in columns)]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)

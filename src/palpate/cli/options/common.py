@@ -179,10 +179,8 @@ DRAWN = Group("Figures", sort_key=4)
 class FigureOptions:
     """Formats and resolution of figures."""
 
-    figures: Annotated[
-        tuple[str, ...], Parameter(negative=(), show_default=", ".join, consume_multiple=True)
-    ] = ("png",)
-    "Formats: png, svg, pdf, one or more."
+    figures: Annotated[tuple[str, ...], Parameter(negative=(), consume_multiple=True)] = ()
+    "Also write the charts as files: png, svg, pdf, one or more."
     dpi: int | None = None
     "Resolution of a PNG; 110 if not given."
 

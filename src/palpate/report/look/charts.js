@@ -30,7 +30,7 @@ const palpate = (() => {
     const behind = digits - 1 - Math.floor(Math.log10(Math.abs(value)));
     return value.toFixed(Math.max(0, Math.min(6, behind))).replace("-", "−");
   };
-  const tick = (value) => (value == null ? "" : String(+value.toPrecision(6)).replace("-", "−"));
+  const tick = (value) => (value == null ? "" : String(+value.toPrecision(6)).replace(/000000$/, "e6").replace("-", "−"));
 
   /* A column as `report/chart.py` makes it; gaps are null, and what it has no place for is undefined. */
   const unpacked = (column) => column.map((value) => (value === "absent" ? undefined : value));
@@ -163,7 +163,7 @@ const palpate = (() => {
         bind: { dblclick: () => () => full() } },
       scales: { x: { time: false, distr: logarithmic.x ? 3 : 1, range: (_, low, high) => [low, high] },
         y: { distr: logarithmic.y ? 3 : 1, range: spec.range } },
-      axes: [axis({ size: 26 }), axis({ size: 52, space: 22 })],
+      axes: [axis({ size: 26 }), axis({ size: 52, space: 22, ...(spec.y ? {} : { values: () => [] }) })],
       series, bands,
       hooks: {
         setCursor: [(own) => {

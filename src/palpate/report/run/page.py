@@ -27,7 +27,7 @@ def write_report(
     identification: Identification | None,
     source: str,
     folder: Path,
-    endings: Sequence[str] = (".png",),
+    endings: Sequence[str] = (),
     dpi: int | None = None,
 ) -> dict[str, str]:
     """Write the figures and report.html of a run into a folder: file name and caption of each figure.
@@ -38,12 +38,12 @@ def write_report(
         identification: what `palpate identify` says of the record; None where it says nothing.
         source: the experiment's file.
         folder: where to.
-        endings: of the figures' files, each of `style.FORMATS`.
+        endings: of the figures' files, each of `style.FORMATS`; without one the charts are on the page alone.
         dpi: of a PNG; `style.DPI` if none is given.
     """
     figures = charts_of_run(record, summary)
     captions = {}
-    for name, (charts, caption) in figures.items():
+    for name, (charts, caption) in figures.items() if endings else ():
         drawing = build_figure(charts)
         for ending in endings:
             style.save(drawing, folder / f"{name}{ending}", dpi)

@@ -1,6 +1,7 @@
 """Any serial arm for use outside a control loop: arrays in, arrays out."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -8,7 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import ArrayLike
 
-from palpate._jit import kernel, law, part
+from palpate._jit import BoundKernel, kernel, law, part
 from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.arrays import Array, Counts
 from palpate.errors import InputError
@@ -289,10 +290,18 @@ class SerialArm(Readable):
             )
         return array
 
+    @cached_property
+    def _describe(self) -> BoundKernel:
+        """The compiled description, bound to the types of this arm's chain."""
+        return BoundKernel(compiled_description)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_describe"}
+
     def _state_at(self, q: ArrayLike, qd: ArrayLike | None = None) -> ArmState:
         rates = np.zeros(self.joints) if qd is None else self._check(qd, "qd")
         state = arm_state_for(self.joints)
-        compiled_description(self.chain, self._check(q, "q"), rates, state)
+        self._describe(self.chain, self._check(q, "q"), rates, state)
         return state
 
 
