@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 
 import h5py
 import numpy as np
@@ -102,6 +103,25 @@ def test_a_size_that_a_file_only_claims_takes_no_memory(tmp_path):
     with pytest.raises(InputError, match="--max-size"):
         read_log(path, time="time", position="position", force="force")
     assert path.stat().st_size < 10_000
+
+
+def test_a_table_of_pandas_has_its_names_and_nothing_in_them_is_run(tmp_path):
+    """PyTables keeps a block of columns as one field, and their names as a pickle; a first row may be empty."""
+    rows = np.zeros(401, [("index", "i8"), ("values_block_0", "f8", (3,)), ("values_block_1", "S9", (1,))])
+    rows["values_block_0"] = np.vstack([np.full(3, np.nan), np.column_stack([X, F, T])])
+    mark = tmp_path / "ran"
+    for names in (["Depth_mm", "Load_N", "Time"], Mark(str(mark))):
+        path = tmp_path / "log.h5"
+        with h5py.File(path, "w") as file:
+            table = file.create_dataset("Test 1/table", data=rows)
+            table.attrs["values_block_0_kind"] = pickle.dumps(names, protocol=0)
+            file["Test 1/_i_table/index/sorted"] = np.arange(5000)
+        listing = list_log(path)
+        assert not mark.exists()
+        if isinstance(names, list):
+            assert listing.proposal.options["time"] == "Test 1.Time"
+            np.testing.assert_allclose(read_log(path)["position"], 1e-3 * X, atol=1e-12)
+        assert not any("_i_table" in entry.name for entry in listing.entries)
 
 
 def test_data_in_other_files_are_not_followed(tmp_path):

@@ -149,6 +149,10 @@ def test_bags(tmp_path):
         "/joints.effort.lift:N",
     )
     assert len(read_as_proposed(path)) == len(TIME)
+    idle = joints("/joints", TIME, ["turn", "lift"], MOVED[:, :2], 0 * MOVED[:, :2])
+    proposal = list_log(write_bag(tmp_path / "idle", "mcap", [idle])).proposal
+    assert proposal.options is None
+    assert "effort.turn never changes" in proposal.guesses[0]
 
 
 def own_types(path, texts, sent):
