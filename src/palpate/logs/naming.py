@@ -48,7 +48,7 @@ _BOOKKEEPING = re.compile(
 )
 """Tokens of a counter or of a state; a column of a force or a position may have them, too."""
 _COMMAND = re.compile(
-    r"(?:target|desired|des$|ref$|reference|setpoint|set$|sp$|cmd|command|goal|soll|demand|nominal|planned)"
+    r"(?:target|desired|des$|ref$|reference|setpoint|set$|sp$|cmd|command|goal|soll|demand|nominal|planned|piezo)"
 )
 _PLACE = re.compile(
     r"(?:tcp|tip|ee$|eef$|effector|end|tool|pose|p$|probe|hand$|flange|cart|trans|point|path|stage|robot|o$|x$)"

@@ -185,9 +185,9 @@ def _one_log(table: Sheet, rows: Sequence[ColumnStatistics], given: Mapping[str,
     for column in usable:
         if column.changes and not column.counts_rows:
             unique.setdefault(_identity(column), column)
-    other = _friction(table, [*unique.values()], {**given, **timing}, (*guesses,))
+    other = None if table.spring else _friction(table, [*unique.values()], {**given, **timing}, (*guesses,))
     other = _in_plane(table, usable, {**given, **timing}, (*guesses,), other) or other
-    pair = _pair([*unique.values()], guesses)
+    pair = _pair([*unique.values()], guesses, certain=table.spring is not None)
     if pair is None:
         return other or Proposal(None, (_lacking(usable),))
     position, force = pair
@@ -441,11 +441,12 @@ def _timing(
 
 
 def _pair(
-    columns: Sequence[ColumnStatistics], guesses: list[str]
+    columns: Sequence[ColumnStatistics], guesses: list[str], *, certain: bool
 ) -> tuple[ColumnStatistics, ColumnStatistics] | None:
     """Position and force: by units and names, or else the two columns that move together most.
 
-    A column that hardly moves is no position, and one that does not follow it is no force.
+    A column that hardly moves is no position, and one that does not follow it is no force, unless it is certain that
+    the named ones are a press, as in a file of force curves.
     """
     moving = [
         column for column in columns if column.may_be("position") and column.counts >= _MIN_POSITION_STEPS
@@ -466,7 +467,8 @@ def _pair(
     follow = [
         pair
         for pair in islice(candidates if places or forces else combinations(moving[:40], 2), _MAX_PAIRS)
-        if statistics.rank_correlation(*pair) > _MIN_RANK_CORRELATION
+        if (by_name and certain)
+        or statistics.rank_correlation(*pair) > _MIN_RANK_CORRELATION
         or (by_name and statistics.explained_power(*pair) > _MIN_EXPLAINED_POWER)
     ]
     pairs = [pair for pair in follow if not statistics.is_one_reading(*pair)]

@@ -216,17 +216,23 @@ def _afm(path: Path, size: float) -> tuple[dict[str, AnyArray], dict[str, Any]]:
     if is_zipfile(path):
         with ZipFile(path) as packed:
             _take(size, sum(part.file_size for part in packed.infolist()))
-    curves = afmformats.load_data(path)
+    unstated: dict[str, float] = {}
+    try:
+        curves = afmformats.load_data(path)
+    except afmformats.errors.MissingMetaDataError as missing:
+        unstated = dict.fromkeys(missing.meta_keys, 1.0)
+        curves = afmformats.load_data(path, meta_override=unstated)
     if not curves:
         raise InputError(f"{path} holds no force curve; export it as text")
     columns, units = {}, {}
     for number, curve in enumerate(curves, 1):
         for title in ("time", "force", "height (measured)", "height (piezo)"):
             if title in curve:
-                name = title if len(curves) == 1 else f"curve {number}.{title}"
+                name = "deflection" if title == "force" and unstated else title
+                name = name if len(curves) == 1 else f"curve {number}.{name}"
                 columns[name] = np.asarray(curve[title], float)
                 size = _take(size, columns[name].nbytes)
-                units[name] = {"time": "s", "force": "N"}.get(title, "m")
+                units[name] = {"time": "s", "force": "" if unstated else "N"}.get(title, "m")
     length = max(map(len, columns.values()), default=0)
     columns = {
         name: np.pad(column, (0, length - len(column)), constant_values=np.nan)
@@ -235,4 +241,7 @@ def _afm(path: Path, size: float) -> tuple[dict[str, AnyArray], dict[str, Any]]:
     about = curves[0].metadata
     timed = any(name.endswith("time") for name in columns)
     rate = None if timed else about.get("rate approach")
-    return columns, {"units": units, "rate": rate, "spring": about.get("spring constant")}
+    lacking = f"the file does not state: {', '.join(unstated)}; the deflection is listed without it"
+    spring = None if "spring constant" in unstated else about.get("spring constant")
+    left_out = {"force": lacking} if unstated else {}
+    return columns, {"units": units, "rate": rate, "spring": spring, "left_out": left_out}
