@@ -222,6 +222,8 @@ def _friction(
         for motion in (_measured(speeds) or _measured(places))
         for load in _measured(loads)
         if _of_one_number(motion, load)
+        and not (load.named.kind == "torque" and motion.named.kind == "position" and motion.named.axis)
+        and load.named.axis in {"", motion.named.axis or load.named.axis}
         and (opposed := statistics.direction_correlation(motion, load, speed=motion in speeds)) > _MIN_OPPOSED
     ]
     if not pairs:
@@ -500,6 +502,10 @@ def _pair(
         ):
             return None
         position, force = (smooth, rough) if cause is None else (cause, smooth)
+        if (
+            position.span > _SIZES["length"][0] / unit(_SIZES["length"][2]).factor
+        ):  # no probe's travel in m or mm
+            return None
         why = "the smoother is" if cause is None else f"both follow the motion of {cause.name!r}, which is"
         guesses.append(
             f"the columns have no names: {smooth.name!r} and {rough.name!r} move together most, and {why} taken for"
