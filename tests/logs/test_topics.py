@@ -381,6 +381,8 @@ def test_a_force_across_the_motion_is_not_its_friction(tmp_path):
     assert (
         proposed(tmp_path, names.format("ForX"), t, x, across).purpose == "identify the friction of the axis"
     )
+    proposal = proposed(tmp_path, "t,a1_vel,a2_vel,a1_torque", t, np.cos(t), 0.3 * np.cos(t), across)
+    assert "'a2_vel' moves with it" in proposal.facts[-1]
     for name in ("ForY", "MomX", "MomZ"):
         assert (
             proposed(tmp_path, names.format(name), t, x, across).purpose

@@ -250,6 +250,11 @@ def is_rate(column: ColumnStatistics, position: ColumnStatistics) -> bool:
     )
 
 
+def moves_as(first: ColumnStatistics, second: ColumnStatistics) -> bool:
+    """True if two speeds are one by more than half of their power, as those of coupled axes."""
+    return abs(float(first.unit_readings @ second.unit_readings)) > _MIN_RATE_CORRELATION
+
+
 def direction_correlation(motion: ColumnStatistics, load: ColumnStatistics, *, speed: bool) -> float:
     """Correlation of a load with the direction of a motion, without its sign, 0 to 1.
 

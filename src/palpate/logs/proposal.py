@@ -243,6 +243,9 @@ def _friction(
             f"{across[0].name!r} is across the motion, {np.nanmean(across[0].values):.3g} on average: a slide's"
             " coefficient is Fc over it"
         )
+    coupled = [c.name for c in speeds if not _of_one_number(motion, c) and statistics.moves_as(motion, c)]
+    if coupled:
+        facts.append(f"{coupled[0]!r} moves with it: if the two are coupled, the friction is that of both")
     none = Proposal(None, (_lacking(columns),))
     return Proposal({**options, **named, "friction": ""}, tuple(notes), tuple(facts), FRICTION, none)
 
