@@ -393,7 +393,10 @@ def test_fields_of_structs_in_parquet(tmp_path):
 def test_a_second_table_beside_the_first_is_no_part_of_its_header(tmp_path):
     """A title over each column, and numbers of a result beside the names and the units."""
     head = [["A 1", "A 1", "A 1"], ["Time", "Travel", "Force", "", 20.0], ["s", "mm", "N", "", 3.1]]
-    rows = [[t, x, f, "", 12.0 * (k == 1) or ""] for k, (t, x, f) in enumerate(zip(T, X, F, strict=True))]
+    rows = [
+        [t, x, f, "", 12.0 * (k == 1) or ""]
+        for k, (t, x, f) in enumerate(zip(*map(np.ndarray.tolist, (T, X, F)), strict=True))
+    ]
     path = spreadsheet(tmp_path / "log.xlsx", {"A 1": [row + [""] * (5 - len(row)) for row in head] + rows})
     assert columns_of(path)[:3] == ["Time", "Travel", "Force"]
     np.testing.assert_allclose(read_log(path)["position"], 1e-3 * np.asarray(X), atol=1e-12)

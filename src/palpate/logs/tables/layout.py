@@ -187,8 +187,9 @@ def _is_row(kinds: Sequence[int], width: int, numeric: Sequence[int]) -> bool:
 def _layout(path: Path, lines: Sequence[TextLine], block: _Block) -> Layout:
     above = [line for line in lines if line.number < block.first]
     symbols: list[str] = []
-    if len(above) > 1 and _is_units(*(block.dialect.header(line.text) for line in above[-2:]), block):
-        symbols = block.dialect.header(above[-1].text)
+    titles, cells = ([block.dialect.header(line.text) for line in above[-2:]] + [[], []])[:2]
+    if len(above) > 1 and _is_units(titles, cells, block):
+        symbols = cells
         above = above[:-1]
     unglued = _unglue(above[-1], block) if above else []
     glued = above[-1].number if unglued else 0
