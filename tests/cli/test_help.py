@@ -1,5 +1,6 @@
 """The help of every command: an example that can be typed, options in groups."""
 
+import ast
 import re
 import shlex
 
@@ -63,6 +64,33 @@ def test_options_are_in_groups(help_of, command):
     assert groups or command == "completion"
     assert "Parameters" not in groups
     assert max(groups.values(), default=0) <= MOST, groups
+
+
+def sentences(source):
+    """The texts of a module that are no docstrings; what is put into them is left out."""
+    tree = ast.parse(source)
+    documents = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            yield "".join(
+                str(getattr(part, "value", "")) for part in node.values if isinstance(part, ast.Constant)
+            )
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documents:
+            yield node.value
+
+
+def options_of(command):
+    return {name for argument in program()[command].assemble_argument_collection() for name in argument.names}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_options_that_its_refusals_name_are_its_own(command, root):
+    """Or of a command that imports it. A sentence about another command, `palpate topics LOG`, names its options."""
+    sources = {name: (root / f"src/palpate/cli/{name}.py").read_text(encoding="utf-8") for name in COMMANDS}
+    users = [name for name in COMMANDS if name == command or f"palpate.cli.{command} import" in sources[name]]
+    texts = [re.split(r"palpate [a-z]", text)[0] for text in sentences(sources[command])]
+    named = {option for text in texts for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", text)}
+    assert named <= set().union(*map(options_of, users))
 
 
 @pytest.mark.parametrize("command", ["", *ALL])

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import pickle
+from zipfile import ZIP_DEFLATED, ZipFile
 
+import afmformats
 import h5py
 import numpy as np
 import pytest
@@ -14,6 +17,7 @@ from palpate.errors import InputError
 from palpate.files.reading import ReadingLimits
 from palpate.logs import read_log
 from palpate.logs.listing import list_log
+from palpate.logs.tables.arrays import unpack
 
 T = np.arange(400) / 100
 X = np.maximum(np.sin(3 * T), 0)
@@ -104,6 +108,25 @@ def test_a_size_that_a_file_only_claims_takes_no_memory(tmp_path):
     assert path.stat().st_size < 10_000
 
 
+def test_a_table_of_pandas_has_its_names_and_nothing_in_them_is_run(tmp_path):
+    """PyTables keeps a block of columns as one field, and their names as a pickle; a first row may be empty."""
+    rows = np.zeros(401, [("index", "i8"), ("values_block_0", "f8", (3,)), ("values_block_1", "S9", (1,))])
+    rows["values_block_0"] = np.vstack([np.full(3, np.nan), np.column_stack([X, F, T])])
+    mark = tmp_path / "ran"
+    for names in (["Depth_mm", "Load_N", "Time"], Mark(str(mark))):
+        path = tmp_path / "log.h5"
+        with h5py.File(path, "w") as file:
+            table = file.create_dataset("Test 1/table", data=rows)
+            table.attrs["values_block_0_kind"] = pickle.dumps(names, protocol=0)
+            file["Test 1/_i_table/index/sorted"] = np.arange(5000)
+        listing = list_log(path)
+        assert not mark.exists()
+        if isinstance(names, list):
+            assert listing.proposal.options["time"] == "Test 1.Time"
+            np.testing.assert_allclose(read_log(path)["position"], 1e-3 * X, atol=1e-12)
+        assert not any("_i_table" in entry.name for entry in listing.entries)
+
+
 def test_data_in_other_files_are_not_followed(tmp_path):
     (tmp_path / "secret").write_bytes(np.arange(400.0).tobytes())
     path = hdf5(tmp_path / "log.h5")
@@ -143,3 +166,48 @@ def test_a_curve_that_is_none_is_refused_in_one_line(tmp_path):
         with pytest.raises(InputError, match="cannot be read as an AFM curve") as refused:
             read_log(path, time="time", position="height (measured)", force="force")
         assert "\n" not in str(refused.value)
+
+
+def test_a_curve_without_its_spring_constant_is_a_deflection(tmp_path, monkeypatch):
+    class Curve(dict):
+        @property
+        def metadata(self):
+            return {"spring constant": 1.0}
+
+    def load(path, meta_override=None):
+        if meta_override != {"spring constant": 1.0}:
+            raise afmformats.errors.MissingMetaDataError(["spring constant"])
+        return [Curve({"time": T, "force": F, "height (measured)": X})]
+
+    monkeypatch.setattr(afmformats, "load_data", load)
+    columns, about = unpack(tmp_path / "curve.ibw", 10**6, "AFM")
+    assert [*columns] == ["time", "deflection", "height (measured)"]
+    assert about["spring"] is None
+    assert "does not state: spring constant" in about["left_out"]["force"]
+
+
+def test_the_text_in_a_zip_archive_is_read_and_a_cut_one_is_refused(tmp_path):
+    path = tmp_path / "log.zip"
+    text = "t,x_mm,f_N\n" + "".join(f"{t},{x},{f}\n" for t, x, f in zip(T, X, F, strict=True))
+    with ZipFile(path, "w", ZIP_DEFLATED) as packed:
+        packed.writestr("log.csv", text)
+    np.testing.assert_allclose(read_log(path)["force"], F)
+    with pytest.raises(InputError, match="--max-size"):
+        read_log(path, limits=ReadingLimits(size=3000))
+    whole = path.read_bytes()
+    path.write_bytes(whole[:60] + b"\0" * 50 + whole[110:])
+    with pytest.raises(InputError, match="cannot be unpacked"):
+        read_log(path)
+    with ZipFile(path, "w") as packed:
+        packed.writestr("a.csv", text)
+        packed.writestr("b.csv", text)
+    with pytest.raises(InputError, match="several files"):
+        read_log(path)
+
+
+def test_the_times_of_a_log_much_shorter_than_the_one_beside_it(tmp_path):
+    ends = np.where(np.arange(len(T)) < 50, 1.0, np.nan)
+    np.savez(tmp_path / "log.npz", **{f"{name}_{k}": v * (1.0 if k == "a" else ends)
+             for k in "ab" for name, v in (("time_s", T), ("depth_mm", X), ("force_N", F))})  # fmt: skip
+    assert len(list_log(tmp_path / "log.npz").proposals) == 2
+    assert list_log(tmp_path / "log.npz").proposals[1].options["time"] == "time_s_b"

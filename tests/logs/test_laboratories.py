@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+import palpate
 from logs.books import spreadsheet
 from palpate.errors import InputError
 from palpate.logs import columns_of, read_log
@@ -266,6 +267,8 @@ def test_rates_that_there_are_not(tmp_path):
     slow = saved(tmp_path, table(zip((4000.0 * T).tolist(), X, F, strict=True)), "slow.csv")
     text = next(n["text"] for n in read_log(slow, **COLUMNS).meta["notes"] if n["code"] == "time-doubtful")
     assert "0.25 rows a second; is its unit ms, with 250 rows a second? Then say t:ms" in text
+    stated = read_log(slow, **{**COLUMNS, "time": "t:s"})
+    assert "time-doubtful" not in {*codes(stated), *palpate.identify(stated).codes}
     fast = read_log(saved(tmp_path, table(), "fast.csv"), **{**COLUMNS, "time": "t:us"})
     assert any("Then say t:s" in note["text"] for note in fast.meta["notes"])
 
@@ -385,3 +388,15 @@ def test_fields_of_structs_in_parquet(tmp_path):
     right(read_log(path, time="t", position="state.x:mm", force="state.ft.z"))
     with pytest.raises(InputError, match="'raw' is a column of lists"):
         read_log(path, time="t", position="raw", force="state.x")
+
+
+def test_a_second_table_beside_the_first_is_no_part_of_its_header(tmp_path):
+    """A title over each column, and numbers of a result beside the names and the units."""
+    head = [["A 1", "A 1", "A 1"], ["Time", "Travel", "Force", "", 20.0], ["s", "mm", "N", "", 3.1]]
+    rows = [
+        [t, x, f, "", 12.0 * (k == 1) or ""]
+        for k, (t, x, f) in enumerate(zip(*map(np.ndarray.tolist, (T, X, F)), strict=True))
+    ]
+    path = spreadsheet(tmp_path / "log.xlsx", {"A 1": [row + [""] * (5 - len(row)) for row in head] + rows})
+    assert columns_of(path)[:3] == ["Time", "Travel", "Force"]
+    np.testing.assert_allclose(read_log(path)["position"], 1e-3 * np.asarray(X), atol=1e-12)

@@ -149,6 +149,10 @@ def test_bags(tmp_path):
         "/joints.effort.lift:N",
     )
     assert len(read_as_proposed(path)) == len(TIME)
+    idle = joints("/joints", TIME, ["turn", "lift"], MOVED[:, :2], 0 * MOVED[:, :2])
+    proposal = list_log(write_bag(tmp_path / "idle", "mcap", [idle])).proposal
+    assert proposal.options is None
+    assert "effort.turn never changes" in proposal.guesses[0]
 
 
 def own_types(path, texts, sent):
@@ -357,6 +361,33 @@ def test_of_columns_without_names_a_slow_drift_is_no_position(tmp_path):
     np.savetxt(path, np.column_stack([t, temperature, 1e3 * x, f]), delimiter=",")
     options = list_log(path).proposal.options
     assert (options["position"], options["force"].partition(":")[0]) == ("2:mm", "3")
+
+
+def test_no_probe_travels_over_a_metre(tmp_path):
+    """A load of two kilonewtons is smoother than the displacement that it follows, and is no position for that."""
+    t = np.arange(2000) / 100
+    x = 0.1 * np.sin(t) + 0.002 * np.random.default_rng(2).standard_normal(len(t))
+    path = tmp_path / "log.csv"
+    np.savetxt(path, np.column_stack([t, x, 2000 * np.sin(t)]), "%.5f", ",")
+    proposal = list_log(path).proposal
+    assert proposal.options is None
+    assert "name both" in proposal.guesses[0]
+
+
+def test_a_force_across_the_motion_is_not_its_friction(tmp_path):
+    t = np.arange(2000) / 100
+    x, across = np.sin(t), 100 * np.sign(np.cos(t)) + np.cos(50 * t)
+    names = "TimeStamp,KNEE.PosX,FP1.{}"
+    assert (
+        proposed(tmp_path, names.format("ForX"), t, x, across).purpose == "identify the friction of the axis"
+    )
+    proposal = proposed(tmp_path, "t,a1_vel,a2_vel,a1_torque", t, np.cos(t), 0.3 * np.cos(t), across)
+    assert "'a2_vel' moves with it" in proposal.facts[-1]
+    for name in ("ForY", "MomX", "MomZ"):
+        assert (
+            proposed(tmp_path, names.format(name), t, x, across).purpose
+            != "identify the friction of the axis"
+        )
 
 
 def turning(t):

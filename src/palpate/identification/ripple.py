@@ -1,7 +1,8 @@
 """A ripple of the force in free motion: one sine over time (hum, vibration) or over position (interference, cogging).
 
 It is fitted in free motion and subtracted from the whole log. The error of its fit, carried on to the contact, and a
-change of a tenth are a part of every interval.
+change of a tenth are a part of every interval. A wave whose phase in contact is unknown is not subtracted: all of it is
+a part of every interval.
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ from palpate.signals.samples import detrend, outer_range, runs
 
 MIN_PERIODS, SURE_PERIODS = 1.5, 2.5
 """Periods of a ripple within one stay in free motion, and the number from which on a drift is no sine."""
+MIN_BEND = 0.25
+"""Periods over the position, in the smallest of `SHARES`, from which a bend of the force in free motion counts, as it
+may go on in contact: half a wave in the whole."""
 MIN_EXPLAINED = 0.5
 """Fraction of the force's variance in free motion that a ripple explains: noise of 30 rows and more leaves less."""
 MIN_EXPLAINED_ALONE = 0.9
@@ -44,26 +48,28 @@ class Ripple:
     Args:
         over_position: the sine is over position, not over time.
         wave: angular frequency or wave number [rad/s], [rad/m].
-        parts: amplitudes of cosine and sine [N], shape (2,).
+        parts: subtracted amplitudes of cosine and sine [N], shape (2,).
         std: standard deviation of each of them in contact [N].
+        size: amplitude in free motion [N].
     """
 
     over_position: bool
     wave: float
     parts: Array
     std: float
-
-    @property
-    def amplitude(self) -> float:
-        """Amplitude of the sine [N]."""
-        return float(np.hypot(*self.parts))
+    size: float
 
     @property
     def text(self) -> str:
         """The ripple and its subtraction, as a sentence."""
         period = 2 * np.pi / self.wave
         where = f"with a period of {1e3 * period:.3g} mm" if self.over_position else f"at {1 / period:.3g} Hz"
-        return f"in free motion the force ripples by {self.amplitude:.3g} N {where}; the ripple is subtracted"
+        done = (
+            "the ripple is subtracted"
+            if self.parts.any()
+            else "it may go on in contact, so the intervals hold it"
+        )
+        return f"in free motion the force ripples by {self.size:.3g} N {where}; {done}"
 
     def columns(self, time: Array, position: Array) -> Array:
         """Cosine and sine at some times [s] and positions [m], shape (2, n)."""
@@ -100,6 +106,10 @@ def find_ripple(channels: Channels, free_motion: FreeMotion | None) -> Ripple | 
         reach = free_motion.way * (free_motion.limit - end)
         fits = _fits(channels, free_motion.way, end, reach, (False, True))
         good = [fit for fit in fits if fit.explained > (MIN_EXPLAINED if fit.sure else MIN_EXPLAINED_ALONE)]
+        if not good:
+            bends = _fits(channels, free_motion.way, end, reach, (True,), MIN_BEND)
+            bent = len(bends) == len(SHARES) and all(fit.explained > MIN_EXPLAINED_ALONE for fit in bends)
+            good = bends[:1] if bent else []
     for way, end, reach in ends:
         if free_motion is None or way == free_motion.way:
             fits = _fits(channels, way, end, reach, (True,))
@@ -107,14 +117,21 @@ def find_ripple(channels: Channels, free_motion: FreeMotion | None) -> Ripple | 
     return max(good, key=lambda fit: fit.explained).ripple(channels) if good else None
 
 
-def _fits(channels: Channels, way: float, end: float, reach: float, kinds: tuple[bool, ...]) -> list[_Fit]:
+def _fits(
+    channels: Channels,
+    way: float,
+    end: float,
+    reach: float,
+    kinds: tuple[bool, ...],
+    periods: float = MIN_PERIODS,
+) -> list[_Fit]:
     """Sines over time (False) or position (True), in `SHARES` of the reach [m] from an end of the position."""
     fits = []
     for share in SHARES:
         inside = channels.valid & (way * (channels.position - end) < share * reach)
         stays = [slice(first, last) for first, last in runs(inside) if last - first >= _MIN_ROWS]
         if stays:
-            fits += [_Fit.of(channels, stays, over_position) for over_position in kinds]
+            fits += [_Fit.of(channels, stays, over_position, periods) for over_position in kinds]
     return [fit for fit in fits if fit is not None]
 
 
@@ -126,25 +143,31 @@ class _Fit:
         over_position: the sine is over position, not over time.
         theta, cov: cosine, sine and wave, and their covariance.
         explained: fraction of the variance.
-        sure: it has so many periods that it is no drift.
+        periods: in the longest stay.
     """
 
     over_position: bool
     theta: Array
     cov: Array
     explained: float
-    sure: bool
+    periods: float
+
+    @property
+    def sure(self) -> bool:
+        """True if the sine has so many periods that it is no drift."""
+        return self.periods > SURE_PERIODS
 
     @classmethod
-    def of(cls, channels: Channels, stays: list[slice], over_position: bool) -> _Fit | None:
+    def of(cls, channels: Channels, stays: list[slice], over_position: bool, least: float) -> _Fit | None:
         """Fit the strongest line of the longest stay to all stays, each with a straight line of its own.
 
-        None if the position has that line too: then the force may follow the motion.
+        None if it has fewer periods than `least`, or if the position has that line too: then the force may follow the
+        motion.
         """
         along = channels.position if over_position else channels.time
         longest = max(stays, key=lambda rows: float(np.ptp(along[rows])))
         reach = float(np.ptp(along[longest]))
-        wave = _strongest(along[longest], detrend(channels.force[longest]))
+        wave = _strongest(along[longest], detrend(channels.force[longest]), least)
         if wave is None:
             return None
         stride = -(-sum(rows.stop - rows.start for rows in stays) // _MAX_ROWS)
@@ -187,13 +210,13 @@ class _Fit:
         moved = flat(np.concatenate([channels.position[rows] for rows in parts]))
         swing = moved - design[:, :2] @ np.linalg.lstsq(design[:, :2], moved, rcond=None)[0]
         swings = not over_position and float(swing @ swing) < (1.0 - MIN_EXPLAINED) * float(moved @ moved)
-        if swings or reach * wave < 2 * np.pi * MIN_PERIODS:
+        periods = reach * wave / (2 * np.pi)
+        if swings or periods < least:
             return None
-        sure = reach * wave > 2 * np.pi * SURE_PERIODS
-        return cls(over_position, np.append(theta[:2], wave), cov, explained, sure)
+        return cls(over_position, np.append(theta[:2], wave), cov, explained, periods)
 
-    def ripple(self, channels: Channels) -> Ripple | None:
-        """The ripple; None if its phase is unknown elsewhere in the log."""
+    def ripple(self, channels: Channels) -> Ripple:
+        """The ripple; without parts to subtract if its phase is unknown elsewhere in the log."""
         cosine, sine, wave = self.theta
         along = (channels.position if self.over_position else channels.time)[
             :: max(len(channels.time) // 500, 1)
@@ -205,11 +228,13 @@ class _Fit:
         variance = float(np.einsum("in,ij,jn->n", gradient, self.cov, gradient).max())
         amplitude = float(np.hypot(cosine, sine))
         std = float(np.hypot(np.sqrt(variance), MAX_CHANGE * amplitude))
-        return Ripple(self.over_position, float(wave), self.theta[:2], std) if std < amplitude / 2 else None
+        if self.periods < MIN_PERIODS or std >= amplitude / 2:
+            return Ripple(self.over_position, float(wave), np.zeros(2), amplitude, amplitude)
+        return Ripple(self.over_position, float(wave), self.theta[:2], std, amplitude)
 
 
-def _strongest(along: Array, force: Array) -> float | None:
-    """The wave with most power in a stay; over position the force is averaged in bins."""
+def _strongest(along: Array, force: Array, periods: float) -> float | None:
+    """The wave with most power in a stay, of some periods at least; over position the force is averaged in bins."""
     low, reach = float(along.min()), float(np.ptp(along))
     count = min(len(along), _BINS)
     if count < 16 or reach <= 0:
@@ -219,5 +244,5 @@ def _strongest(along: Array, force: Array) -> float | None:
     filled = np.flatnonzero(numbers)
     values = detrend(np.interp(np.arange(count), filled, sums[filled] / numbers[filled]))
     power = np.abs(np.fft.rfft(values * np.hanning(count), 8 * count)) ** 2
-    first = int(8 * MIN_PERIODS)
+    first = int(8 * periods)
     return 2 * np.pi * (first + int(np.argmax(power[first:]))) / 8 / reach

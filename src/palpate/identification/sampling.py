@@ -108,7 +108,7 @@ def channels_of(record: Record) -> Channels:
     if rate < _LOW_RATE:
         limit_text = f"motion faster than about {rate / 8:.2g} Hz is not seen"
         warnings.append(Warn(Code.LOW_RATE, f"only {rate:.3g} fresh readings a second: {limit_text}"))
-        if dt >= _LONG_STEP:
+        if dt >= _LONG_STEP and not record.meta.get("time_stated"):
             text = f"by its unit there is a row every {dt:.3g} s: is the time in ms? then say NAME:ms"
             warnings.append(Warn(Code.TIME_DOUBTFUL, text))
     grid = time if even else np.arange(time[0], time[-1] + dt / 2, dt)

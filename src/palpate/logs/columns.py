@@ -25,7 +25,7 @@ NAMES = {
 _MAX_REPEATED_STAMPS = 20
 """Rows that may share a stamp on average: drivers that poll their sensor repeat three or four."""
 _MIN_TIMED = 0.2
-"""Smallest fraction of rows with a time: of two tests side by side, the shorter one ends in empty cells."""
+"""Smallest fraction of rows with a time, up to its last: of tests side by side, the shorter ones end in empty cells."""
 _BLOCKS = 16
 """Blocks of a log over which a coherence is averaged, half overlapping: two columns of noise have about one over their
 number."""
@@ -95,7 +95,8 @@ class ColumnStatistics:
         A driver that reads faster than its clock repeats stamps; one that counts whole seconds repeats most of them.
         """
         step = np.diff(self.finite)
-        if len(step) < 3 or len(self.finite) < _MIN_TIMED * len(self.values):
+        filled = np.flatnonzero(np.isfinite(self.values))
+        if len(step) < 3 or len(filled) < _MIN_TIMED * filled[-1]:
             return False
         forward = int(np.count_nonzero(step > 0))
         if self.named.kind == "time":
@@ -247,6 +248,11 @@ def is_rate(column: ColumnStatistics, position: ColumnStatistics) -> bool:
     return float(readings @ position.unit_rate) > max(
         _MIN_RATE_CORRELATION, abs(float(readings @ position.unit_readings))
     )
+
+
+def moves_as(first: ColumnStatistics, second: ColumnStatistics) -> bool:
+    """True if two speeds are one by more than half of their power, as those of coupled axes."""
+    return abs(float(first.unit_readings @ second.unit_readings)) > _MIN_RATE_CORRELATION
 
 
 def direction_correlation(motion: ColumnStatistics, load: ColumnStatistics, *, speed: bool) -> float:

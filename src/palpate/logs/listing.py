@@ -174,7 +174,19 @@ def from_topics(bag: bags.Bag, fields: Mapping[str, Sequence[str]]) -> Proposal:
     pair = _joint(bag, fields, guesses) or _fields_by_name(fields, guesses)
     if not pair:
         return Proposal(None, ("no two topics are a position and a force",))
-    return Proposal(pair, tuple(guesses))
+    still = [name for spec in pair.values() if not _changes(bag, name := spec.rpartition(":")[0])]
+    return (
+        Proposal(None, (f"{still[0]} never changes: no contact shows",))
+        if still
+        else Proposal(pair, tuple(guesses))
+    )
+
+
+def _changes(bag: bags.Bag, name: str) -> bool:
+    """True if a field, TOPIC.FIELD, holds more than one number."""
+    topic = max((topic for topic in bag.topics if name.startswith(f"{topic}.")), key=len)
+    streams, _ = bag.streams({topic: [name.removeprefix(f"{topic}.")]})
+    return bool(np.ptp(streams[topic].values) > 0)
 
 
 def _topic(topics: Sequence[bags.Topic], what: str, guesses: list[str]) -> bags.Topic | None:

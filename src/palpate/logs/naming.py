@@ -48,12 +48,14 @@ _BOOKKEEPING = re.compile(
 )
 """Tokens of a counter or of a state; a column of a force or a position may have them, too."""
 _COMMAND = re.compile(
-    r"(?:target|desired|des$|ref$|reference|setpoint|set$|sp$|cmd|command|goal|soll|demand|nominal|planned)"
+    r"(?:target|desired|des$|ref$|reference|setpoint|set$|sp$|cmd|command|goal|soll|demand|nominal|planned|piezo)"
 )
 _PLACE = re.compile(
     r"(?:tcp|tip|ee$|eef$|effector|end|tool|pose|p$|probe|hand$|flange|cart|trans|point|path|stage|robot|o$|x$)"
 )
 """Tokens of the things whose place is meant by an axis alone, as in `tcp_x`."""
+_SHORT = re.compile(r"\b(For|Mom)(?=[XYZ]$)")
+"""Words for a force and a moment in front of their axis, as gait laboratories write them: `FP1.ForY`."""
 _TRANSFORM = re.compile(r"(?:^|[._/])(?:O|F|EE|NE)_(?:T|F|ddP|dP)_[A-Za-z]")
 """Element of a matrix or a vector of a robot's state in Franka's notation, which only the whole has a meaning."""
 _VECTOR = re.compile(
@@ -106,6 +108,7 @@ def read_name(name: str, stated: str = "") -> ColumnName:
     vector = _VECTOR.search(plain)
     if vector:
         return _component((vector[1] or vector[2]).lower(), int(vector[3]), plain[: vector.start()])
+    plain = _SHORT.sub(lambda match: {"For": "Force", "Mom": "Moment"}[match[1]], plain)
     tokens = [token for token in _TOKEN.findall(plain) if token not in {"header", "field", "actual"}]
     lower = [token.lower() for token in tokens]
     ending = re.search(r"_([A-Za-z\u00b5\u03bc]{1,4})$", plain)

@@ -185,9 +185,9 @@ def _one_log(table: Sheet, rows: Sequence[ColumnStatistics], given: Mapping[str,
     for column in usable:
         if column.changes and not column.counts_rows:
             unique.setdefault(_identity(column), column)
-    other = _friction(table, [*unique.values()], {**given, **timing}, (*guesses,))
+    other = None if table.spring else _friction(table, [*unique.values()], {**given, **timing}, (*guesses,))
     other = _in_plane(table, usable, {**given, **timing}, (*guesses,), other) or other
-    pair = _pair([*unique.values()], guesses)
+    pair = _pair([*unique.values()], guesses, certain=table.spring is not None)
     if pair is None:
         return other or Proposal(None, (_lacking(usable),))
     position, force = pair
@@ -222,6 +222,8 @@ def _friction(
         for motion in (_measured(speeds) or _measured(places))
         for load in _measured(loads)
         if _of_one_number(motion, load)
+        and not (load.named.kind == "torque" and motion.named.kind == "position" and motion.named.axis)
+        and load.named.axis in {"", motion.named.axis or load.named.axis}
         and (opposed := statistics.direction_correlation(motion, load, speed=motion in speeds)) > _MIN_OPPOSED
     ]
     if not pairs:
@@ -241,6 +243,9 @@ def _friction(
             f"{across[0].name!r} is across the motion, {np.nanmean(across[0].values):.3g} on average: a slide's"
             " coefficient is Fc over it"
         )
+    coupled = [c.name for c in speeds if not _of_one_number(motion, c) and statistics.moves_as(motion, c)]
+    if coupled:
+        facts.append(f"{coupled[0]!r} moves with it: if the two are coupled, the friction is that of both")
     none = Proposal(None, (_lacking(columns),))
     return Proposal({**options, **named, "friction": ""}, tuple(notes), tuple(facts), FRICTION, none)
 
@@ -441,11 +446,12 @@ def _timing(
 
 
 def _pair(
-    columns: Sequence[ColumnStatistics], guesses: list[str]
+    columns: Sequence[ColumnStatistics], guesses: list[str], *, certain: bool
 ) -> tuple[ColumnStatistics, ColumnStatistics] | None:
     """Position and force: by units and names, or else the two columns that move together most.
 
-    A column that hardly moves is no position, and one that does not follow it is no force.
+    A column that hardly moves is no position, and one that does not follow it is no force, unless it is certain that
+    the named ones are a press, as in a file of force curves.
     """
     moving = [
         column for column in columns if column.may_be("position") and column.counts >= _MIN_POSITION_STEPS
@@ -466,7 +472,8 @@ def _pair(
     follow = [
         pair
         for pair in islice(candidates if places or forces else combinations(moving[:40], 2), _MAX_PAIRS)
-        if statistics.rank_correlation(*pair) > _MIN_RANK_CORRELATION
+        if (by_name and certain)
+        or statistics.rank_correlation(*pair) > _MIN_RANK_CORRELATION
         or (by_name and statistics.explained_power(*pair) > _MIN_EXPLAINED_POWER)
     ]
     pairs = [pair for pair in follow if not statistics.is_one_reading(*pair)]
@@ -498,6 +505,10 @@ def _pair(
         ):
             return None
         position, force = (smooth, rough) if cause is None else (cause, smooth)
+        if (
+            position.span > _SIZES["length"][0] / unit(_SIZES["length"][2]).factor
+        ):  # no probe's travel in m or mm
+            return None
         why = "the smoother is" if cause is None else f"both follow the motion of {cause.name!r}, which is"
         guesses.append(
             f"the columns have no names: {smooth.name!r} and {rough.name!r} move together most, and {why} taken for"

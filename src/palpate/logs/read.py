@@ -60,7 +60,8 @@ def read_log(
 
     Returns:
         A record whose `meta` holds `source`, `start_s` (the first row's own time), `notes` (assumptions), and,
-        of a bag, `facts` (how it was read), `frames` (that its headers name, by column) and `position_from` (`joints`).
+        of a bag, `facts` (how it was read), `frames` (that its headers name, by column) and `position_from` (`joints`);
+        `time_stated` where the log or the name of the time says its unit.
 
     Raises:
         InputError: a fault in the file or with these arguments, in one line.
@@ -81,7 +82,7 @@ def read_log(
         loaded = from_table(open_table(path, kind, delimiter, limits, join), columns, rate, missing)
     roles.check_range(loaded.columns, {role: split_spec(spec)[0] for role, spec in columns.items()}, path)
     if "time" in columns:
-        loaded.notes += roles.implausible_times(loaded.columns, loaded.start, columns["time"])
+        loaded.notes += roles.implausible_times(loaded, columns["time"])
     return _record(loaded, path, start, end)
 
 
@@ -93,6 +94,8 @@ def _record(loaded: roles.Loaded, path: Path, start: float | None, end: float | 
         meta["frames"] = loaded.frames
     if loaded.joints:
         meta["position_from"] = "joints"
+    if loaded.time_stated:
+        meta["time_stated"] = True
     arrays = _cut(loaded.columns, start, end, path)
     return Record(arrays, {name: loaded.units[name] for name in arrays}, meta)
 
@@ -233,12 +236,14 @@ def from_table(
     words = [str(word) for word in missing]
     arrays = dict(zip(places, table.numbers(list(places.values()), words), strict=True))
     filled = np.flatnonzero(np.any([np.isfinite(values) for values in arrays.values()], axis=0))
-    if len(filled):  # of two tests side by side, the shorter ends in empty cells
-        arrays = {role: values[: filled[-1] + 1] for role, values in arrays.items()}
+    rows = (
+        slice(filled[0], filled[-1] + 1) if len(filled) else slice(None)
+    )  # of two tests, one may be shorter
+    arrays = {role: values[rows] for role, values in arrays.items()}
     if not len(next(iter(arrays.values()))):
         raise InputError(f"{table.path} holds a header and no rows; give a log with a row for each sample")
     loaded = roles.Loaded(arrays, {"time": "s"}, 0.0, list(table.notes))
-    origin = _subtract_start(table, places, arrays)
+    origin = _subtract_start(table, places, arrays, rows)
     for role, spec in columns.items():
         name = table.names[places[role]]
         stated = table.stated.get(table.names[places[role]], Stated(None))
@@ -246,6 +251,9 @@ def from_table(
         symbol = _symbol(role, spec, table, places[role], epoch, loaded.notes)
         if role != "time":
             loaded.notes += _mark_missing(role, arrays[role], name, declared=bool(words))
+        if role == "time":
+            said = ":" in spec or stated.unit or unit_in_name(name, "time")
+            loaded.time_stated = bool(said) or name in table.clocks
         loaded.units[role] = unit(symbol).si
         arrays[role] += stated.offset
         arrays[role] *= stated.scale * unit(symbol).factor
@@ -258,7 +266,9 @@ def from_table(
     return loaded
 
 
-def _subtract_start(table: Sheet, places: Mapping[str, int], arrays: Mapping[str, Array]) -> float:
+def _subtract_start(
+    table: Sheet, places: Mapping[str, int], arrays: Mapping[str, Array], rows: slice
+) -> float:
     """Take the first row's time off before it is scaled, in whole numbers where floats would lose some.
 
     Returns:
@@ -269,7 +279,7 @@ def _subtract_start(table: Sheet, places: Mapping[str, int], arrays: Mapping[str
     time = arrays["time"]
     origin = float(time[0])
     counts = table.counts(places["time"]) if abs(origin) >= _LOSSLESS else None
-    time[:] = time - origin if counts is None else (counts - counts[0])[: len(time)]
+    time[:] = time - origin if counts is None else (counts[rows] - counts[rows][0])
     return origin
 
 

@@ -58,6 +58,7 @@ class Loaded:
         facts: what else there is to say, a sentence each.
         frames: the frame that a topic's headers name, by role.
         joints: the position is that of a joint.
+        time_stated: the log, the name of the time or the user says its unit.
     """
 
     columns: dict[str, Array]
@@ -67,6 +68,7 @@ class Loaded:
     facts: list[str] = field(default_factory=list)
     frames: dict[str, str] = field(default_factory=dict)
     joints: bool = False
+    time_stated: bool = False
 
 
 def family(role: str) -> str:
@@ -178,19 +180,18 @@ def check_range(columns: Mapping[str, Array], names: Mapping[str, str], path: Pa
             )
 
 
-def implausible_times(columns: Mapping[str, Array], start: float, spec: str) -> list[dict[str, Any]]:
-    """Doubts about the time of a log, as in a record's meta.
+def implausible_times(loaded: Loaded, spec: str) -> list[dict[str, Any]]:
+    """Doubts about the time of a log, as in a record's meta. Rows may be as rare as a stated unit says.
 
     Args:
-        columns: by role, in SI units.
-        start: the first row's own time [s].
+        loaded: the columns, in SI units.
         spec: the user's name of the time, NAME or NAME:UNIT.
 
     Raises:
         InputError: the time runs backwards repeatedly.
     """
-    time = columns["time"]
-    step = np.diff(time)
+    columns, start = loaded.columns, loaded.start
+    step = np.diff(columns["time"])
     if len(step) < 3 or not np.isfinite(step).all():
         return []
     back = int((step < 0).sum())
@@ -202,7 +203,8 @@ def implausible_times(columns: Mapping[str, Array], start: float, spec: str) -> 
     if not declared and np.all(step == 1.0) and start in {0.0, 1.0}:
         text = f"{name!r} is {start:g}, {start + 1:g}, {start + 2:g}, ...: it counts rows rather than seconds"
         return [_note("time-doubtful", f"{text}; give --rate with the rows a second instead of --time")]
-    if dt and not _MIN_RATE <= 1 / dt <= _MAX_RATE:
+    rare = 1 / _MIN_RATE if not loaded.time_stated else np.inf
+    if dt and not 1 / _MAX_RATE <= dt <= rare:
         text = f"by {spec!r} there are {1 / dt:.3g} rows a second"
         return [_note("time-doubtful", f"{text}{_suggest_unit(name, dt, declared, spec)}")]
     return []

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from pickletools import genops
+from types import MappingProxyType
 from typing import Any
 from zipfile import ZipFile, is_zipfile
 
@@ -97,7 +99,8 @@ def _hdf5(path: Path, size: float) -> tuple[dict[str, AnyArray], dict[str, Any]]
         count += 1
         if count > _MAX_OBJECTS:
             raise MemoryError
-        if place.startswith("#") or not isinstance(node, h5py.Dataset) or node.dtype.kind not in "biufV":
+        skipped = place.startswith("#") or "/_i_" in place  # of MATLAB, of PyTables' index
+        if skipped or not isinstance(node, h5py.Dataset) or node.dtype.kind not in "biufV":
             return
         name = place.replace("/", ".")
         if node.is_virtual or node.external:
@@ -106,8 +109,10 @@ def _hdf5(path: Path, size: float) -> tuple[dict[str, AnyArray], dict[str, Any]]
         if _text(node.attrs, "MATLAB_class") in {"char", "cell"} or node.size in {None, 0}:
             return
         size = _take(size, node.size * node.dtype.itemsize)
-        values = node[()]
-        for title, column in _fields(name, np.asarray(values)):
+        labels = {
+            field: _pickled_texts(_text(node.attrs, f"{field}_kind")) for field in node.dtype.names or ()
+        }
+        for title, column in _fields(name, np.asarray(node[()]), labels):
             arrays[title] = column
             units[title] = _text(node.attrs, "units") or _text(node.attrs, "unit")
 
@@ -133,10 +138,25 @@ def _text(attributes: Any, name: str) -> str:
     )
 
 
-def _fields(name: str, values: AnyArray) -> Iterator[tuple[str, AnyArray]]:
-    """An array of numbers, or the fields of a structured one."""
+def _pickled_texts(text: str) -> list[str]:
+    """The texts in a pickle, as pandas keeps the names of a block of columns; nothing in it is run."""
+    try:
+        operations = list(genops(text.encode()))
+    except ValueError:
+        return []
+    return [str(word) for operation, word, _ in operations if "UNICODE" in operation.name]
+
+
+def _fields(
+    name: str, values: AnyArray, labels: Mapping[str, Sequence[str]] = MappingProxyType({})
+) -> Iterator[tuple[str, AnyArray]]:
+    """An array of numbers, or the fields of a structured one; a field of several columns by its labels."""
     for field in values.dtype.names or ():
-        if values[field].dtype.kind in "biufV":
+        block = values[field]
+        if block.dtype.kind in "biuf" and block.ndim == 2 and block.shape[1] == len(labels.get(field, ())):
+            group = name.removesuffix(".table")
+            yield from ((f"{group}.{label}", block[:, i]) for i, label in enumerate(labels[field]))
+        elif block.dtype.kind in "biufV":
             yield from _fields(f"{name}.{field}" if name else field, values[field])
     if values.dtype.names is None and values.dtype.kind in "biuf":
         yield name, values
@@ -196,17 +216,23 @@ def _afm(path: Path, size: float) -> tuple[dict[str, AnyArray], dict[str, Any]]:
     if is_zipfile(path):
         with ZipFile(path) as packed:
             _take(size, sum(part.file_size for part in packed.infolist()))
-    curves = afmformats.load_data(path)
+    unstated: dict[str, float] = {}
+    try:
+        curves = afmformats.load_data(path)
+    except afmformats.errors.MissingMetaDataError as missing:
+        unstated = dict.fromkeys(missing.meta_keys, 1.0)
+        curves = afmformats.load_data(path, meta_override=unstated)
     if not curves:
         raise InputError(f"{path} holds no force curve; export it as text")
     columns, units = {}, {}
     for number, curve in enumerate(curves, 1):
         for title in ("time", "force", "height (measured)", "height (piezo)"):
             if title in curve:
-                name = title if len(curves) == 1 else f"curve {number}.{title}"
+                name = "deflection" if title == "force" and unstated else title
+                name = name if len(curves) == 1 else f"curve {number}.{name}"
                 columns[name] = np.asarray(curve[title], float)
                 size = _take(size, columns[name].nbytes)
-                units[name] = {"time": "s", "force": "N"}.get(title, "m")
+                units[name] = {"time": "s", "force": "" if unstated else "N"}.get(title, "m")
     length = max(map(len, columns.values()), default=0)
     columns = {
         name: np.pad(column, (0, length - len(column)), constant_values=np.nan)
@@ -215,4 +241,7 @@ def _afm(path: Path, size: float) -> tuple[dict[str, AnyArray], dict[str, Any]]:
     about = curves[0].metadata
     timed = any(name.endswith("time") for name in columns)
     rate = None if timed else about.get("rate approach")
-    return columns, {"units": units, "rate": rate, "spring": about.get("spring constant")}
+    lacking = f"the file does not state: {', '.join(unstated)}; the deflection is listed without it"
+    spring = None if "spring constant" in unstated else about.get("spring constant")
+    left_out = {"force": lacking} if unstated else {}
+    return columns, {"units": units, "rate": rate, "spring": spring, "left_out": left_out}

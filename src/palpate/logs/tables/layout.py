@@ -146,7 +146,7 @@ def _longest_block(lines: Sequence[TextLine], dialect: Dialect, budget: ReadingB
     first = next((i for i in range(run[-1] + 1) if _is_row(kinds[i], width, numeric)), None)
     if first is None:
         return None
-    first = _below_header(kinds, width, first)
+    first = _below_header(kinds, width, first, numeric)
     filled = max(index for index in range(width) if any(cells[i][index] for i in run)) + 1
     text = usual.count(-1)
     delimited = dialect.delimiter != " " and width > 1
@@ -156,17 +156,21 @@ def _longest_block(lines: Sequence[TextLine], dialect: Dialect, budget: ReadingB
     )
 
 
-def _below_header(kinds: Sequence[Sequence[int]], width: int, first: int) -> int:
+def _below_header(kinds: Sequence[Sequence[int]], width: int, first: int, numeric: Sequence[int]) -> int:
     """The first row: lines between the header and it that hold numbers are rows, though a cell of them is wrong.
 
-    One number beside a word is a label and its value.
+    One number beside a word is a label and its value; numbers where the rows have none are of a table beside them.
     """
     begin = first
     while (
-        begin > 0 and len(kinds[begin - 1]) == width and kinds[begin - 1].count(1) >= (2 if width == 2 else 1)
+        begin > 0
+        and len(above := kinds[begin - 1]) == width
+        and sum(above[index] == 1 for index in numeric) >= (2 if width == 2 else 1)
     ):
         begin -= 1
-    named = begin > 0 and len(kinds[begin - 1]) == width and 1 not in kinds[begin - 1]
+    named = (
+        begin > 0 and len(above := kinds[begin - 1]) == width and all(above[index] < 1 for index in numeric)
+    )
     return begin if named else first
 
 
@@ -183,8 +187,9 @@ def _is_row(kinds: Sequence[int], width: int, numeric: Sequence[int]) -> bool:
 def _layout(path: Path, lines: Sequence[TextLine], block: _Block) -> Layout:
     above = [line for line in lines if line.number < block.first]
     symbols: list[str] = []
-    if len(above) > 1 and _is_units(titles := block.dialect.header(above[-1].text), block):
-        symbols = titles
+    titles, cells = ([block.dialect.header(line.text) for line in above[-2:]] + [[], []])[:2]
+    if len(above) > 1 and _is_units(titles, cells, block):
+        symbols = cells
         above = above[:-1]
     unglued = _unglue(above[-1], block) if above else []
     glued = above[-1].number if unglued else 0
@@ -210,12 +215,13 @@ def _layout(path: Path, lines: Sequence[TextLine], block: _Block) -> Layout:
     )
 
 
-def _is_units(cells: Sequence[str], block: _Block) -> bool:
-    """True if a line is a row of units: nothing else, and at least half of the columns have one."""
+def _is_units(titles: Sequence[str], cells: Sequence[str], block: _Block) -> bool:
+    """True if a line is a row of units: fewer other words, and at least half of the names above it have one."""
     symbols = [cell.strip("[]() ") for cell in cells]
     units = [symbol for symbol in symbols if symbol and known_unit(symbol)]
     words = [symbol for symbol in symbols if symbol and not known_unit(symbol)]
-    return len(cells) >= block.filled and len(units) >= max(1, block.filled / 2) and len(words) < len(units)
+    names = sum(bool(title) for title in titles[: block.filled]) or block.filled
+    return len(cells) >= block.filled and len(units) >= max(1, names / 2) and len(words) < len(units)
 
 
 def _header(line: TextLine, block: _Block) -> list[str]:
@@ -231,7 +237,7 @@ def _header(line: TextLine, block: _Block) -> list[str]:
         fitting = _trim_cells(dialect.header(text))
         if len(fitting) == block.filled > 1:
             return fitting
-    words = all(block.dialect.kind(cell) < 1 for cell in titles)
+    words = all(block.dialect.kind(cell) < 1 for cell in titles[: block.filled])
     if line.comment or block.dialect.delimiter == " " or not words or 2 * len(titles) < block.filled:
         return []
     return titles if len(titles) > 1 or block.filled == 1 else []

@@ -32,7 +32,7 @@ _OTHER_FORMATS = {
     b"\x1f\x8b": "is compressed by gzip; unpack it first",
     b"BZh": "is compressed by bzip2; unpack it first",
     b"\x28\xb5\x2f\xfd": "is compressed by zstd; unpack it first",
-    b"PK\x03\x04": "is a zip archive; unpack it first",
+    b"PK\x03\x04": "is a zip archive of several files; unpack it first",
     b"\xd0\xcf\x11\xe0": "is a spreadsheet of the old kind (.xls); save it as .xlsx or CSV",
     b"\xff\xfe": "is UTF-16 text; save it as UTF-8",
     b"\xfe\xff": "is UTF-16 text; save it as UTF-8",

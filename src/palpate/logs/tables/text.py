@@ -2,11 +2,13 @@
 
 import csv
 import io
+import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 import polars
@@ -47,6 +49,7 @@ def read_text_sheet(
     Raises:
         InputError: the file is no text, or has no rows of numbers.
     """
+    content = _unzip(path, budget) if content is None else content
     if content is None:
         budget.take(path.stat().st_size)
         with path.open("rb") as file:
@@ -75,6 +78,20 @@ def read_text_sheet(
         path, names, rows.read, rows.counts, units | preamble.columns, preamble.rate,
         doubts=lambda name: _doubts(name, layout), speed=preamble.speed, spring=preamble.spring,
     )  # fmt: skip
+
+
+def _unzip(path: Path, budget: ReadingBudget) -> str | None:
+    """The text of the only file in a zip archive; None of anything else."""
+    try:
+        with ZipFile(path) as packed:
+            (part,) = packed.infolist()
+            budget.take(part.file_size)
+            with packed.open(part) as file:
+                return file.read(part.file_size).decode(errors="replace")
+    except (BadZipFile, ValueError):
+        return None
+    except (OSError, RuntimeError, EOFError, zlib.error) as error:
+        raise InputError(f"{path} cannot be unpacked ({error}); is it whole?") from None
 
 
 def _holds_quotes(path: Path, first_row: int) -> bool:
