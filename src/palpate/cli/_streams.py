@@ -30,12 +30,13 @@ def prepare() -> None:
     """Make the streams of this process ready for any text.
 
     A stream that was closed before the program began is opened to the null device: otherwise the next opened file
-    would take its descriptor. A letter that the encoding lacks is escaped.
+    would take its descriptor. Standard output then takes nothing, so that no answer is lost without a word. A letter
+    that the encoding lacks is escaped.
     """
     codecs.register_error(_ERRORS, _replace_letters)
     for name, number, mode in (("stdin", 0, "r"), ("stdout", 1, "w"), ("stderr", 2, "w")):
         if getattr(sys, name) is None:
-            _redirect_to_null(number)
+            _redirect_to_null(number, os.O_RDONLY if name == "stdout" else os.O_RDWR)
             setattr(sys, name, open(number, mode, encoding="utf-8", closefd=False))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
@@ -102,8 +103,8 @@ def drop(stream: TextIO) -> None:
         stream.flush()
 
 
-def _redirect_to_null(number: int) -> None:
-    nowhere = os.open(os.devnull, os.O_RDWR)
+def _redirect_to_null(number: int, mode: int = os.O_RDWR) -> None:
+    nowhere = os.open(os.devnull, mode)
     if nowhere != number:
         os.dup2(nowhere, number)
         os.close(nowhere)
@@ -257,6 +258,7 @@ _REMEDIES = {
     errno.ENOTDIR: "check the path: one of its folders is a file",
     errno.EISDIR: "name a file, not a folder",
     errno.EEXIST: "choose another name",
+    errno.EBADF: "standard output is closed: redirect it, as with: > FILE",
 }
 
 
