@@ -288,7 +288,7 @@ def _exit_code(error: BaseException) -> int:
     match error:
         case SystemExit(__context__=BrokenPipeError()):  # rich's way of saying it
             return READER_GONE
-        case SystemExit():
+        case SystemExit() if not _own_code_fails(error):
             return error.code if isinstance(error.code, int) else DONE
         case KeyboardInterrupt():
             return _say("interrupted", INTERRUPTED)
@@ -309,14 +309,20 @@ def _exit_code(error: BaseException) -> int:
 
 def _report_defect(error: BaseException) -> int:
     """Print the traceback of a defect; what the user's own code raises beside Exceptions is one line."""
-    if not isinstance(error, Exception):
-        from palpate.plugins import reason, where_it_fails
+    if _own_code_fails(error):
+        from palpate.plugins import reason
 
-        if where_it_fails(error):
-            return _say(f"{reason(error)}; let your code raise an Exception, or end by itself", WRONG_INPUT)
+        return _say(f"{reason(error)}; let your code raise an Exception, or end by itself", WRONG_INPUT)
     with suppress(OSError):
         sys.stderr.write(printable("".join(traceback.format_exception(error))))
     return _say("this is a defect of palpate; please report the lines above", DEFECT)
+
+
+def _own_code_fails(error: BaseException) -> bool:
+    """True for an exit, or another error beside Exceptions, that the user's own code raised."""
+    from palpate.plugins import where_it_fails
+
+    return not isinstance(error, Exception) and where_it_fails(error) != ""
 
 
 def _say(text: str, code: int, longest: int = LONGEST) -> int:
