@@ -32,7 +32,7 @@ from test_typed_edge import NO_NUMBERS, NO_VECTORS, NUMBERS, vectors
 CALLS = 50
 """Calls of one object."""
 SIZES = (0.0, -0.0, 1.0, -1.0, 1e-320, 1e-9, 1e3, -1e12, 1e150, -1e300, 1e308, np.nan, np.inf, -np.inf)
-VALUES = [*SIZES] * 2 + [*NUMBERS, *NO_NUMBERS, *NO_VECTORS, *vectors()]
+VALUES = [*SIZES, *NUMBERS, *vectors()] * 2 + [*NO_NUMBERS, *NO_VECTORS]
 VALUES += [np.full(3, size) for size in SIZES] + [np.outer(np.ones(n), np.arange(3.0)) for n in (0, 1, 4)]
 VALUES += [
     np.arange(12.0).reshape(4, 3).T,

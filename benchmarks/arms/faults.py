@@ -97,24 +97,9 @@ class Result:
 
 
 _SIGNALS = (
-    *(
-        "INT",
-        "TERM",
-        "HUP",
-        "QUIT",
-        "TSTP",
-        "USR1",
-        "USR2",
-        "ALRM",
-        "VTALRM",
-        "PROF",
-        "XCPU",
-        "IO",
-        "PWR",
-        "STKFLT",
-    ),
+    "INT", "TERM", "HUP", "QUIT", "TSTP", "USR1", "USR2", "ALRM", "VTALRM", "PROF", "XCPU", "IO", "PWR", "STKFLT",
     "RTMIN",
-)
+)  # fmt: skip
 APART = ("rtde", "franka", "ros2")
 FAULTS = (
     *(Fault("signal", f"SIG{name}", "signals", (name,)) for name in _SIGNALS),
@@ -230,18 +215,8 @@ class Stand:
         if self.fault.way == "law":
             words = [sys.executable, str(HERE / "faulty_press.py"), str(self.fault.what)]
         at += ROS2 if self.kind == "ros2" else ""
-        words += [
-            "press",
-            "--wire",
-            at,
-            "--gains",
-            str(self.cell / "gains.toml"),
-            *WORDS,
-            "--yes",
-            "--record",
-            "rec",
-        ]
-        words += ["--seconds", "3"]
+        words += ["press", "--wire", at, "--gains", str(self.cell / "gains.toml"), *WORDS]
+        words += ["--yes", "--record", "rec", "--seconds", "3"]
         ours, theirs = pty.openpty() if self.fault.what == "hang up" else os.pipe()
         if self.fault.what == "hang up":
             words = [sys.executable, "-c", CONTROLLED, *words[2:]]

@@ -173,25 +173,9 @@ def _cell(chance: random.Random, value: float, decimal: str) -> str:
 def names(chance: random.Random, folder: Path) -> Words:
     """A log of a name that shells, globs, parsers or terminals take for something else."""
     parts = (
-        "[1]",
-        '["whole.csv"]',
-        "-x",
-        "--help",
-        "a\nb",
-        "$(id)",
-        "{}",
-        "%s",
-        "\udcff\udcfe",
-        "<b>",
-        "'",
-        "ä",
-        "\x1b[2J",
-        "*",
-        "~",
-        ".",
-        " ",
-        "x" * 200,
-    )
+        "[1]", '["whole.csv"]', "-x", "--help", "a\nb", "$(id)", "{}", "%s", "\udcff\udcfe", "<b>", "'", "ä",
+        "\x1b[2J", "*", "~", ".", " ", "x" * 200,
+    )  # fmt: skip
     name = "".join(chance.choice(parts) for _ in range(chance.choice((1, 1, 2)))) + chance.choice(
         (".csv", "", ".CSV", ".txt")
     )
@@ -218,52 +202,11 @@ def _copied(source: Path, path: Path) -> None:
 
 
 LEAVES: tuple[Any, ...] = (
-    *(
-        0,
-        1,
-        -1,
-        10**30,
-        -(10**400),
-        0.0,
-        -0.0,
-        1e-320,
-        1e150,
-        1e308,
-        -1e308,
-        math.nan,
-        math.inf,
-        -math.inf,
-        True,
-        False,
-    ),
-    *(
-        "",
-        "x",
-        "\x1b[2J",
-        "<script>alert(1)</script>",
-        "student:A",
-        "os:system",
-        "x" * 5000,
-        "../../etc/passwd",
-        "ä😀\u202e",
-        "*/ int x; /*",
-        "1",
-        "nan",
-    ),
-    *(
-        [],
-        [1],
-        [[]],
-        [1, "x"],
-        [1e308] * 3,
-        [0.0] * 3,
-        {},
-        {"kind": "x"},
-        {"a": {"b": {"c": 1}}},
-        [0] * 10000,
-        None,
-    ),
-)
+    0, 1, -1, 10**30, -(10**400), 0.0, -0.0, 1e-320, 1e150, 1e308, -1e308, math.nan, math.inf, -math.inf, True,
+    False, "", "x", "\x1b[2J", "<script>alert(1)</script>", "student:A", "os:system", "x" * 5000,
+    "../../etc/passwd", "ä😀\u202e", "*/ int x; /*", "1", "nan", [], [1], [[]], [1, "x"], [1e308] * 3, [0.0] * 3, {},
+    {"kind": "x"}, {"a": {"b": {"c": 1}}}, [0] * 10000, None,
+)  # fmt: skip
 
 
 def edited(tree: Any, chance: random.Random) -> Any:

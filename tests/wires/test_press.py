@@ -123,25 +123,6 @@ def test_a_force_that_stands_still_ends_the_press_as_that_and_is_shown(folder):
     assert outcome.troubles[outcome.ended] >= 10
 
 
-@pytest.mark.parametrize(
-    ("lie", "says"),
-    [
-        (force(lambda now, first: math.nan), "no number"),
-        (lambda sense, first: sense._replace(quaternion=(0.0,) * 4), "a quaternion of length 0"),
-        (lambda sense, first: sense._replace(quaternion=(1e200, 0.0, 0.0, 0.0)), "no orientation"),
-        (lambda sense, first: sense._replace(stamp=5.0 * sense.stamp - 4.0 * first.stamp), "run too fast"),
-        (lambda sense, first: sense._replace(stamp=first.stamp - 1.0), "went back"),
-        (lambda sense, first: sense._replace(position=(0.4, 0.0, 1e200)), "from the start"),
-    ],
-)
-def test_a_reading_that_is_none_ends_the_press_with_its_reason(folder, lie, says):
-    outcome, wire, rows = lying(folder, lie)
-    assert not outcome.ok
-    assert says in outcome.ended
-    assert rows.count <= len(wire.sent)  # the retreat has commands without a reading
-    assert retreat_of(wire)
-
-
 class LatePlaces:
     """A lie: each position is one of up to six ticks ago, at random, and never older than the one before.
 
