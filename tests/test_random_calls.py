@@ -106,17 +106,13 @@ def call_at_random(name, choices):
     assert compiled_versions() == before
 
 
-def choices():
-    """Numbers that choose calls: a method, whether the object is copied before it, and the arguments."""
-    number = st.integers(0, 10_000)
-    return st.lists(st.tuples(number, st.integers(0, 30), *[number] * 4), min_size=CALLS, max_size=CALLS)
-
-
 @pytest.mark.parametrize("examples", [10, pytest.param(2000, marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", CASES)
 def test_any_calls_give_finite_numbers_or_one_line(name, examples):
-    given(choices())(
-        settings(max_examples=examples, deadline=None, phases=[Phase.generate])(
-            lambda drawn: call_at_random(name, drawn)
-        )
-    )()
+    number = st.integers(0, 10_000)
+    call = st.tuples(
+        number, st.integers(0, 30), *[number] * 4
+    )  # method, whether it is copied before, arguments
+    chosen = st.lists(call, min_size=CALLS, max_size=CALLS)
+    bounded = settings(max_examples=examples, deadline=None, phases=[Phase.generate])
+    given(chosen)(bounded(lambda choices: call_at_random(name, choices)))()

@@ -1,4 +1,4 @@
-"""The typed edge of compiled code: nothing but numbers of the right shape gets through, and nothing compiles later."""
+"""The typed edge of compiled code: nothing but numbers of the right shape gets through."""
 
 from __future__ import annotations
 
