@@ -78,6 +78,9 @@ FEW = {
     "options": 10,
     "FOUND, tuned": 6,
     "certificate, checked": 25,
+    "environments": 12,
+    "plug-ins": 25,
+    "tables of places": 25,
 }
 """Inputs of kinds that take little time; the slow ones are `long`."""
 

@@ -1,4 +1,4 @@
-"""The typed edge of compiled code: nothing but numbers of the right shape gets through, and nothing compiles later."""
+"""The typed edge of compiled code: nothing but numbers of the right shape gets through."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from palpate.errors import InputError
 from palpate.force import ForceLoop, SlidingLoop
 from palpate.identifiers import ContactIdentifier, NeuralProbe, RecursiveLeastSquares, RestartingLeastSquares
 from palpate.identifiers.neural_probe import SETTINGS
-from palpate.networks.perceptron import Perceptron
 
 NUMBERS = (
     1,
@@ -90,58 +89,6 @@ def test_an_estimator_takes_a_regressor_of_its_shape_alone(make):
     for force in NO_NUMBERS:
         with pytest.raises(InputError):
             make().update([1.0, 2.0, 3.0], force)
-
-
-@pytest.mark.parametrize("n", [3, *(pytest.param(n, marks=pytest.mark.long) for n in (1, 2, 5))])
-def test_a_matrix_is_no_regressor(n):
-    for make in (RecursiveLeastSquares, RestartingLeastSquares):
-        for shape in ((1, n), (n, 1), (n, 5), (1, 1, n), (n, n, n), ()):
-            if shape != (n,):
-                with pytest.raises(InputError, match="regressor must"):
-                    make(np.zeros(n), np.eye(n)).update(np.ones(shape), 1.0)
-
-
-def overloads(*kernels):
-    """Compiled versions of kernels, by which one sees that something compiled."""
-    return [len(one.compiled.overloads) for one in kernels]
-
-
-def test_after_construction_nothing_compiles():
-    from palpate.force import force_loop
-    from palpate.force.sliding import sliding_loop
-    from palpate.identifiers import contact_identifier, estimator, neural_probe
-    from palpate.networks import perceptron
-
-    objects = {name: make() for name, make in ESTIMATORS.items()}
-    force, slide = ForceLoop(gains_of()), SlidingLoop(tuned())
-    contact = ContactIdentifier("butterworth3:120", 1000.0, 0.004, sampling=480.0)
-    net = Perceptron.random((3, 4, 3), 1.0, 1e-3)
-    kernels = (
-        force_loop._step, sliding_loop._slide, contact_identifier._one, estimator._one, estimator._many,
-        neural_probe._follow, perceptron._forward, perceptron._learn,
-    )  # fmt: skip
-    before = overloads(*kernels)
-    for number in NUMBERS:
-        force.update(number, number, number)
-        slide.update([number] * 3, [number] * 3, [number] * 3, number)
-        contact.update(number, number)
-        contact.update_many([number] * 3, [number] * 3)
-        for one in objects.values():
-            one.update([number] * 3, number)
-            one.update_many([[number] * 3] * 2, [number] * 2)
-        net.learning_rate = number
-        net.learn(net.forward([number] * 3))
-    for vector in vectors():
-        slide.update(vector, vector, vector)
-        contact.update_many(vector, vector)
-        net.learn(0.0 * net.forward(vector))
-        for one in objects.values():
-            one.update(vector, 1.0)
-            one.update_many([vector], [1.0])
-            fixed = np.ones((2, 3))
-            fixed.flags.writeable = False
-            one.update_many(fixed, fixed[:, 0])
-    assert overloads(*kernels) == before
 
 
 def test_loops_refuse_what_is_no_number():

@@ -97,24 +97,9 @@ class Result:
 
 
 _SIGNALS = (
-    *(
-        "INT",
-        "TERM",
-        "HUP",
-        "QUIT",
-        "TSTP",
-        "USR1",
-        "USR2",
-        "ALRM",
-        "VTALRM",
-        "PROF",
-        "XCPU",
-        "IO",
-        "PWR",
-        "STKFLT",
-    ),
+    "INT", "TERM", "HUP", "QUIT", "TSTP", "USR1", "USR2", "ALRM", "VTALRM", "PROF", "XCPU", "IO", "PWR", "STKFLT",
     "RTMIN",
-)
+)  # fmt: skip
 APART = ("rtde", "franka", "ros2")
 FAULTS = (
     *(Fault("signal", f"SIG{name}", "signals", (name,)) for name in _SIGNALS),
@@ -146,6 +131,12 @@ FAULTS = (
         if name.startswith("quaternion")
     ),
     *(Fault("clock", name, "lie", name) for name in CLOCKS),
+    *(Fault("contact", f"{name}, in contact", "lie", name) for name in CLOCKS),
+    *(
+        Fault("contact", f"{name} on the way, in contact", "relay", name, ("rtde", "franka", "ros2"))
+        for name in ("flip", "replay", "reorder", "delay")
+    ),
+    Fault("contact", "garbage on the way, in contact", "relay", "garbage", ("rtde", "franka")),
 )
 
 
@@ -190,10 +181,9 @@ class Stand:
     def _arm(self):
         where = ("--domain", DOMAIN) if self.kind == "ros2" else ("--address", ARM)
         where = () if self.kind == "sim" else where
-        lies = self.fault.way == "lie" and self.fault.name in LIES
         bias = ("--bias", "0", "0", "1") if self.kind == "sim" else ()
-        stays = lies or self.fault.what in {"jitter", "loss"}
-        name = self.fault.name if self.fault.way == "lie" else "none"
+        stays = self._in_contact or self.fault.what in {"jitter", "loss"}
+        name = self.fault.what if self.fault.way == "lie" else "none"
         words = (
             HERE / "faulty_arm.py",
             name,
@@ -205,14 +195,19 @@ class Stand:
         more = ("--seconds", 120, "--gap", 0.002 if stays else 0.05, "--stiffness", STIFFNESS, *bias)
         return child(*words, *more, *where)
 
+    @property
+    def _in_contact(self) -> bool:
+        """True if the fault comes while the arm presses, and not on the way to the surface."""
+        return self.fault.group in {"sensor", "contact"}
+
     def _relay(self):
         if self.kind == "ros2":
             return child(TESTS / "dds_relay.py", DOMAIN, DOMAIN + 1, self.fault.what)
         return child(TESTS / "relay.py", self.kind, NEAR, ARM, self.fault.what)
 
     def _rows(self) -> int:
-        """Readings before the fault: a lie comes in contact, everything else on the way there."""
-        slow = 20 if self.fault.way == "law" else 250 if self.fault.name in LIES else 40
+        """Readings before the fault."""
+        slow = 20 if self.fault.way == "law" else 250 if self._in_contact else 40
         return slow * (10 if self.kind == "franka" and slow > 40 else 1)
 
     def _press(self, at: str):
@@ -220,18 +215,8 @@ class Stand:
         if self.fault.way == "law":
             words = [sys.executable, str(HERE / "faulty_press.py"), str(self.fault.what)]
         at += ROS2 if self.kind == "ros2" else ""
-        words += [
-            "press",
-            "--wire",
-            at,
-            "--gains",
-            str(self.cell / "gains.toml"),
-            *WORDS,
-            "--yes",
-            "--record",
-            "rec",
-        ]
-        words += ["--seconds", "3"]
+        words += ["press", "--wire", at, "--gains", str(self.cell / "gains.toml"), *WORDS]
+        words += ["--yes", "--record", "rec", "--seconds", "3"]
         ours, theirs = pty.openpty() if self.fault.what == "hang up" else os.pipe()
         if self.fault.what == "hang up":
             words = [sys.executable, "-c", CONTROLLED, *words[2:]]

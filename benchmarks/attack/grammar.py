@@ -19,6 +19,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import surroundings
 from samples import FORCE, NAMES, PLACE, ROOT, SAMPLES, TIME, sources
 
 import instruments
@@ -28,124 +29,30 @@ Words = list[list[str]]
 COLUMNS = (f"--time={NAMES[0]}", f"--position={NAMES[1]}:mm", f"--force={NAMES[2]}:N")
 
 NUMBERS = (
-    *(
-        "0",
-        "-0",
-        "1",
-        "-1",
-        "5",
-        "0.1",
-        "1e-3",
-        "1e3",
-        "1e6",
-        "1e12",
-        "1e150",
-        "1e300",
-        "1e308",
-        "-1e308",
-        "1.8e308",
-    ),
-    *(
-        "nan",
-        "inf",
-        "-inf",
-        "1e-320",
-        "5e-324",
-        "9" * 400,
-        "1e5000",
-        "0x10",
-        "1_000",
-        "１２",
-        "",
-        " ",
-        "--5",
-        "1,5",
-    ),
-    *("2147483648", "9223372036854775808", "-9223372036854775809", "True", "None", "1+1", "1e", ".", "+"),
-)
+    *"""
+    0 -0 1 -1 5 0.1 1e-3 1e3 1e6 1e12 1e150 1e300 1e308 -1e308 1.8e308 nan inf -inf 1e-320 5e-324 1e5000 0x10
+    1_000 １２ --5 1,5 2147483648 9223372036854775808 -9223372036854775809 True None 1+1 1e . +
+    """.split(),  # noqa: SIM905 - a list of so many words is unreadable
+    *("9" * 400, "", " "),
+)  # fmt: skip
 UNITS = ("", "", ":N", ":mm", ":m", ":s", ":N/m", ":kg", ":Hz", ":%", ":furlong", ":", "::", ":1", "\n:N")
 WORDS = (
-    *(
-        "x",
-        "position_mm:mm",
-        "force_N",
-        "base",
-        "tool",
-        "auto",
-        "csv",
-        "both",
-        "all",
-        "1",
-        "K",
-        "K=1e308,B=-1",
-    ),
-    *("K=5000,B=50", "K=", "=", "K=nan,B=nan", "K=5%", "sphere:5:mm", "sphere:1e308:m", "butterworth3:120"),
-    *(
-        "butterworth999999999:1",
-        "ur5e",
-        "thesis",
-        "fr33",
-        "a:b:c:d",
-        "student:A",
-        "os:system",
-        "-",
-        "--",
-        "-1",
-    ),
-    *(
-        "1:2",
-        "2:1",
-        "0:0",
-        "500:20000",
-        "1e-300:1e300",
-        "nan:nan",
-        "0,0,1",
-        "0,0,0",
-        "1e308,1e308,1e308",
-        "1,2",
-    ),
-    *(
-        "\x1b[2J",
-        "\u202egnp",
-        "<script>",
-        "[bold]",
-        "$x^{$",
-        "'",
-        '"',
-        "{}",
-        "%s%n",
-        "\\",
-        "\udcff",
-        "a\nb",
-        "ä" * 50,
-    ),
-    *("x" * 5000, "[" * 3000, "(" * 3000, "*" * 100, "0" * 5000, ",".join("1" * 500), "😀", "None", "true"),
-)
+    *"""
+    x position_mm:mm force_N base tool auto csv both all 1 K K=1e308,B=-1 K=5000,B=50 K= = K=nan,B=nan K=5%
+    sphere:5:mm sphere:1e308:m butterworth3:120 butterworth999999999:1 ur5e thesis fr33 a:b:c:d student:A
+    os:system - -- -1 1:2 2:1 0:0 500:20000 1e-300:1e300 nan:nan 0,0,1 0,0,0 1e308,1e308,1e308 1,2 <script>
+    [bold] $x^{$ ' {} %s%n 😀 None true
+    """.split(),  # noqa: SIM905 - a list of so many words is unreadable
+    *("\x1b[2J", "\u202egnp", '"', "\\", "\udcff", "a\nb", "ä" * 50, "x" * 5000, "[" * 3000, "(" * 3000,
+    "*" * 100, "0" * 5000, ",".join("1" * 500)),
+)  # fmt: skip
 PLACES = (
-    *(
-        ".",
-        "..",
-        "no/such/folder/x.json",
-        "/dev/full",
-        "/dev/null",
-        "/proc/self/mem",
-        "/proc/none/x",
-        "x" * 300,
-    ),
-    *(
-        "out",
-        "out.json",
-        "out.toml",
-        "out.html",
-        "out.png",
-        "out.csv",
-        "out.parquet",
-        "[1].json",
-        "-o",
-        "\udcff.png",
-    ),
-    *("whole.csv", "link", "folder", "folder/x.html", "a\nb.html", "whole.csv/x", "~", "$HOME", "empty.csv"),
-)
+    *"""
+    . .. no/such/folder/x.json /dev/full /dev/null /proc/self/mem /proc/none/x out out.json out.toml out.html
+    out.png out.csv out.parquet [1].json -o whole.csv link folder folder/x.html whole.csv/x ~ $HOME empty.csv
+    """.split(),  # noqa: SIM905 - a list of so many words is unreadable
+    *("x" * 300, "\udcff.png", "a\nb.html"),
+)  # fmt: skip
 COMMANDS: dict[str, tuple[int, tuple[str, ...]]] = {
     "identify": (6, ("whole.csv", *COLUMNS)),
     "topics": (2, ("whole.csv",)),
@@ -158,6 +65,8 @@ COMMANDS: dict[str, tuple[int, tuple[str, ...]]] = {
     "certify": (3, ("gains.toml", "--held-only")),
     "export": (2, ("found.json", "--to=mjcf-spring", "--damping=50", "--mass=0.01")),
     "press": (1, ("--arm=ur5e", "--force=20:N", "--surface=K=5000,B=50", "--seconds=0.05", "--out=pressed")),
+    "slide": (1, ("--arm=ur5e", "--surface=K=5000,mu=0.3", "--path=line", "--seconds=1", "--out=slid")),
+    "map": (1, ("--table=whole.csv",)),
     "run": (1, ("foam-hybrid", "--print")),
     "study": (1, ("learning-rate", "--print")),
     "live": (1, ("--arm=fr33",)),
@@ -264,25 +173,9 @@ def _cell(chance: random.Random, value: float, decimal: str) -> str:
 def names(chance: random.Random, folder: Path) -> Words:
     """A log of a name that shells, globs, parsers or terminals take for something else."""
     parts = (
-        "[1]",
-        '["whole.csv"]',
-        "-x",
-        "--help",
-        "a\nb",
-        "$(id)",
-        "{}",
-        "%s",
-        "\udcff\udcfe",
-        "<b>",
-        "'",
-        "ä",
-        "\x1b[2J",
-        "*",
-        "~",
-        ".",
-        " ",
-        "x" * 200,
-    )
+        "[1]", '["whole.csv"]', "-x", "--help", "a\nb", "$(id)", "{}", "%s", "\udcff\udcfe", "<b>", "'", "ä",
+        "\x1b[2J", "*", "~", ".", " ", "x" * 200,
+    )  # fmt: skip
     name = "".join(chance.choice(parts) for _ in range(chance.choice((1, 1, 2)))) + chance.choice(
         (".csv", "", ".CSV", ".txt")
     )
@@ -309,52 +202,11 @@ def _copied(source: Path, path: Path) -> None:
 
 
 LEAVES: tuple[Any, ...] = (
-    *(
-        0,
-        1,
-        -1,
-        10**30,
-        -(10**400),
-        0.0,
-        -0.0,
-        1e-320,
-        1e150,
-        1e308,
-        -1e308,
-        math.nan,
-        math.inf,
-        -math.inf,
-        True,
-        False,
-    ),
-    *(
-        "",
-        "x",
-        "\x1b[2J",
-        "<script>alert(1)</script>",
-        "student:A",
-        "os:system",
-        "x" * 5000,
-        "../../etc/passwd",
-        "ä😀\u202e",
-        "*/ int x; /*",
-        "1",
-        "nan",
-    ),
-    *(
-        [],
-        [1],
-        [[]],
-        [1, "x"],
-        [1e308] * 3,
-        [0.0] * 3,
-        {},
-        {"kind": "x"},
-        {"a": {"b": {"c": 1}}},
-        [0] * 10000,
-        None,
-    ),
-)
+    0, 1, -1, 10**30, -(10**400), 0.0, -0.0, 1e-320, 1e150, 1e308, -1e308, math.nan, math.inf, -math.inf, True,
+    False, "", "x", "\x1b[2J", "<script>alert(1)</script>", "student:A", "os:system", "x" * 5000,
+    "../../etc/passwd", "ä😀\u202e", "*/ int x; /*", "1", "nan", [], [1], [[]], [1, "x"], [1e308] * 3, [0.0] * 3, {},
+    {"kind": "x"}, {"a": {"b": {"c": 1}}}, [0] * 10000, None,
+)  # fmt: skip
 
 
 def edited(tree: Any, chance: random.Random) -> Any:
@@ -566,6 +418,7 @@ GRAMMARS: dict[str, tuple[int, Callable[[random.Random, Path], Words]]] = {
     "names of files": (4, names),
     "MJCF and URDF": (6, xml),
     **instruments.GRAMMARS,
+    **surroundings.GRAMMARS,
     **{kind: (1 if kind == "FOUND, tuned" else 4, tree_of(kind)) for kind in TREES},
 }
 """By kind: its share of the inputs, and what makes one."""

@@ -62,82 +62,29 @@ def _number(chance: random.Random, value: float, notation: str) -> str:
 
 def _word(chance: random.Random) -> str:
     long = chance.choice(LONG)
-    return chance.choice(
-        (
-            "",
-            "MISSING",
-            "OVER",
-            "-3.697314E+28",
-            "NaN",
-            "1e999",
-            "2020-02-30T10:00:00",
-            "25:61:61",
-            "#",
-            "//",
-            '"',
-            "'",
-            "-",
-            "+",
-            "1" * long,
-            "." * long,
-            "[" * long,
-            "(" * long,
-            "1," * 20,
-            "0x1f",
-            "\x00",
-            "\x1b]0;x\x07",
-            "1_000",
-            "١٢٣",
-            "True",
-        )
-    )
+    return chance.choice((
+        "", "MISSING", "OVER", "-3.697314E+28", "NaN", "1e999", "2020-02-30T10:00:00", "25:61:61", "#", "//", '"',
+        "'", "-", "+", "1" * long, "." * long, "[" * long, "(" * long, "1," * 20, "0x1f", "\x00", "\x1b]0;x\x07",
+        "1_000", "١٢٣", "True",
+    ))  # fmt: skip
 
 
 def _name(chance: random.Random) -> str:
     long = chance.choice(LONG[:3])
     names = (
-        "Time",
-        "Extension (mm)",
-        "Load (N)",
-        "Force",
-        "x",
-        "t",
-        "fz",
-        "z",
-        "Q0",
-        "",
-        "1",
-        "a:b",
-        "[mm]",
-        "x" * long,
-        "[" * long,
-    )
+        "Time", "Extension (mm)", "Load (N)", "Force", "x", "t", "fz", "z", "Q0", "", "1", "a:b", "[mm]",
+        "x" * long, "[" * long,
+    )  # fmt: skip
     return chance.choice(names)
 
 
 def _preamble(chance: random.Random, mark: str) -> str:
     long = chance.choice(LONG)
-    return chance.choice(
-        (
-            "#",
-            "%",
-            "//",
-            ";",
-            "# made",
-            "Sample rate: 1000 Hz",
-            "Sampling interval (s) 0,001",
-            "sampl" + "_" * long,
-            "Rate" + mark + "100",
-            "***End_of_Header***",
-            "Channel\tForce\tPos",
-            "Units\tN\tmm",
-            "Scale\t1e308\t0",
-            "Offset\tx\t1",
-            "volts",
-            mark * long,
-            "sep=" + mark,
-        )
-    )
+    return chance.choice((
+        "#", "%", "//", ";", "# made", "Sample rate: 1000 Hz", "Sampling interval (s) 0,001", "sampl" + "_" * long,
+        "Rate" + mark + "100", "***End_of_Header***", "Channel\tForce\tPos", "Units\tN\tmm", "Scale\t1e308\t0",
+        "Offset\tx\t1", "volts", mark * long, "sep=" + mark,
+    ))  # fmt: skip
 
 
 def _strange(chance: random.Random, mark: str) -> str:

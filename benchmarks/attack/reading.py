@@ -28,6 +28,7 @@ from typing import Any
 from grammar import GRAMMARS, prepare
 from mutate import mutated
 from samples import COVERED, HEAD, NAMES, SAMPLES, SHARES
+from surroundings import run_in_environment
 
 from palpate.cli import _streams
 from palpate.errors import LONGEST
@@ -211,7 +212,12 @@ def _load_study(path: str) -> None:
     plan_runs(load(path), path)
 
 
-LOADED = {"@arm": _load_arm, "@experiment": _load_experiment, "@study": _load_study}
+LOADED = {
+    "@arm": _load_arm,
+    "@experiment": _load_experiment,
+    "@study": _load_study,
+    "@environment": run_in_environment,
+}
 """Files that are read by the library alone, as a command would do more than read them."""
 
 
@@ -223,7 +229,7 @@ def _by_library(words: list[str]) -> int:
 
 
 def _columns(path: Path, columns: tuple[str, ...]) -> tuple[str, ...]:
-    return columns if path.suffix in {".csv", ".parquet", ".mat"} else ()
+    return columns if path.suffix in {".csv", ".parquet", ".mat", ".xlsx"} else ()
 
 
 class Spoiled:

@@ -63,6 +63,13 @@ def mat(path: Path) -> None:
     savemat(path, {"time_s": TIME, "position_mm": 1e3 * PLACE, "force_N": FORCE})
 
 
+def excel(path: Path) -> None:
+    """A sheet of a spreadsheet."""
+    from logs.books import spreadsheet
+
+    spreadsheet(path, {"Press": [list(NAMES), *TABLE.tolist()]})
+
+
 def bag(kind: str) -> Callable[[Path], None]:
     """A recorder's file: `bag1`, `mcap` or `sqlite`."""
 
@@ -135,6 +142,7 @@ SAMPLES: dict[str, tuple[str, Callable[[Path], None]]] = {
     "Parquet": (".parquet", parquet),
     "record": (".parquet", record),
     "MATLAB": (".mat", mat),
+    "Excel": (".xlsx", excel),
     "ROS 1 bag": (".bag", bag("bag1")),
     "MCAP": (".mcap", bag("mcap")),
     "SQLite bag": (".db3", bag("sqlite")),
@@ -147,7 +155,7 @@ SAMPLES: dict[str, tuple[str, Callable[[Path], None]]] = {
 """By kind: the ending of its name, and who makes it."""
 
 SHARES = {
-    "CSV": 12, "Parquet": 2, "record": 2, "MATLAB": 2, "ROS 1 bag": 4, "MCAP": 4, "SQLite bag": 4,
+    "CSV": 12, "Parquet": 2, "record": 2, "MATLAB": 2, "Excel": 2, "ROS 1 bag": 4, "MCAP": 4, "SQLite bag": 4,
     "experiment": 20, "study": 20, "journal": 20, "gains": 8, "certificate": 2,
 }  # fmt: skip
 """Of the inputs of an attack: fewer of what takes long, such as formats that are read in a process of their own."""

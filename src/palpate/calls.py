@@ -199,14 +199,10 @@ def _check(name: str, value: Any, *, pair: bool) -> None:
     if (
         pair != isinstance(value, tuple | list)
         or len(numbers) != 1 + pair
-        or not all(map(_is_number, numbers))
+        or not all(isinstance(number, Real) and not isinstance(number, bool) for number in numbers)
     ):
         expected = "a pair, its value and its standard deviation" if pair else "a number in SI units"
         raise InputError(f"{name} must be {expected}, got {value!r}")
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 @contextmanager

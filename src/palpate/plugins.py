@@ -142,7 +142,10 @@ def _of_the_user(file: Path) -> bool:
 def reason(error: BaseException) -> str:
     """An error of the user's code in one line: where, of which kind, and its own words."""
     location = where_it_fails(error)
-    words = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())
+    try:
+        words = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())
+    except BaseException:  # noqa: BLE001 - the words are the user's code, too
+        words = ""
     message = f"{type(error).__name__}: {words}" if words else type(error).__name__
     return f"{location}: {message}" if location else message
 

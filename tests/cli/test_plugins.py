@@ -167,3 +167,22 @@ def test_what_is_raised_beside_exceptions_is_one_line_without_escapes(where, tmp
     line = RAISES[where][: RAISES[where].index("raise Evil")].count("\n") + 1
     assert f"{name}.py, line {line}: Evil: a\\x1b[31mb c" in said
     assert not (tmp_path / "runs" / "e-0").exists()
+
+
+@pytest.mark.parametrize(
+    ("raised", "told"),
+    [("SystemExit(0)", "SystemExit: 0"), ("Mute", "Mute"), ("GeneratorExit", "GeneratorExit")],
+)
+def test_a_part_that_ends_the_program_or_has_no_words_is_one_line(
+    raised, told, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    name = f"ends_{raised[:4].lower()}"
+    code = "class Mute(BaseException):\n    def __str__(self):\n        raise self\n\n\n"
+    code += f"class Name:\n    def __init__(self):\n        raise {raised}\n\n"
+    code += "    def update(self, regressor, force): ...\n    def estimate(self): ...\n"
+    (tmp_path / f"{name}.py").write_text(code)
+    assert main(["checks", f"{name}:Name"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert f"{name}.py, line 8: {told}; let your code" in said

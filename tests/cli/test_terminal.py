@@ -122,12 +122,13 @@ def test_little_is_needed_of_the_environment(tmp_path, variables, encoding, told
     assert (tmp_path / "excite.png").is_file() == drawn
 
 
-def test_streams_that_were_closed_are_nowhere(tmp_path):
-    """No file that is opened later is taken for them."""
-    ran = subprocess.run(
-        f"'{sys.executable}' -m palpate run --list >&- 2>&- <&-", shell=True, check=False, cwd=tmp_path
-    )
-    assert ran.returncode == 0
+@pytest.mark.parametrize(("closed", "code"), [("2>&- <&-", 0), (">&-", 2), (">&- 2>&- <&-", 2)])
+def test_an_answer_that_a_closed_stream_loses_is_an_error(closed, code, tmp_path):
+    command = f"'{sys.executable}' -m palpate run --list {closed}"
+    ran = subprocess.run(command, shell=True, check=False, cwd=tmp_path, capture_output=True)
+    assert ran.returncode == code
+    assert (ran.stdout != b"") == (code == 0)
+    assert ran.stderr.count(b"\n") == (closed == ">&-")
 
 
 def test_a_stream_without_a_file_is_no_trouble(monkeypatch):

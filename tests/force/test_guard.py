@@ -11,23 +11,8 @@ from palpate.force.contact_evidence import FREE_MOTION
 from palpate.force.guard import BEYOND, BLIND, BOUNCED, DRIFTS, SWINGS, TROUBLES, UNTARED, Guarded, state_in
 from palpate.force.simulated_press import pressed, surface, world_of
 
-HOSTILE = [
-    0.0,
-    -0.0,
-    1e-300,
-    1e77,
-    -1e77,
-    1e154,
-    1e300,
-    np.nan,
-    np.inf,
-    -np.inf,
-    5.0,
-    99.5,
-    101.0,
-    999.0,
-    -999.0,
-]
+HOSTILE = [0.0, -0.0, 1e-300, 1e77, -1e77, 1e154, 1e300, np.nan, np.inf, -np.inf]
+HOSTILE += [5.0, 99.5, 101.0, 999.0, -999.0]
 
 
 def troubles(control, rows):

@@ -149,3 +149,13 @@ def test_the_calibration_is_a_cause_of_the_working_point_too(logs):
 def test_octaves_without_lines_have_no_level_of_noise():
     assert white_level(np.ones(3), np.zeros(3)) == 0.0
     assert white_level(np.array([1.0, 9.0]), np.array([0.0, 5.0])) == 9.0
+
+
+def test_a_half_width_is_a_fraction_of_the_size_of_its_value():
+    found = Measurement(-4.0, {"lag": Contribution(1.0)})
+    assert found.relative_half == pytest.approx(1.96 / 4.0, rel=1e-3)
+    assert found.known_to(found.relative_half * (1.0 + 1e-12))
+    assert not found.known_to(found.relative_half * (1.0 - 1e-12))
+    assert np.isfinite(Measurement(0.0, found.contributions).relative_half)
+    certain = Measurement(-4.0, found.contributions | {"noise": Contribution(1.0, 1e5)})
+    assert certain.freedom == pytest.approx(4e5, rel=1e-3)

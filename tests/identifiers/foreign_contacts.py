@@ -17,17 +17,9 @@ Array = NDArray[np.float64]
 FINE = 16_000
 """Steps a second of the contact [Hz]."""
 FAULTS = (
-    "none",
-    "dropped",
-    "not a number",
-    "chatter",
-    "saturation",
-    "loss of contact",
-    "begins in air",
-    "coarse encoder",
-    "surface changes",
-    "relaxing",
-)
+    "none", "dropped", "not a number", "chatter", "saturation", "loss of contact", "begins in air", "coarse encoder",
+    "surface changes", "relaxing",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

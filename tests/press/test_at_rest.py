@@ -8,7 +8,7 @@ import pytest
 
 from palpate.errors import InputError
 from palpate.force import load_arm
-from palpate.press.at_rest import check_drift, fitting, noise_and_drift
+from palpate.press.at_rest import check_drift, check_range, fitting, noise_and_drift
 from palpate.press.engines import press_gains
 
 GAINS = press_gains(load_arm("ur5e"), 20.0)
@@ -62,3 +62,12 @@ def test_gains_are_those_of_the_noise_that_is_there():
     assert (again.theta, again.gain, again.approach) == (GAINS.theta, GAINS.gain, GAINS.approach)
     with pytest.raises(InputError, match="below 8 standard deviations"):
         fitting(GAINS, 3.0, 250)
+
+
+def test_a_force_is_read_up_to_the_full_scale_and_no_further():
+    check_range(20.0, 80.0, 100.0)
+    check_range(98.9, 1.0, 100.0)
+    with pytest.raises(InputError, match="tare it"):
+        check_range(20.1, 80.0, 100.0)
+    with pytest.raises(InputError, match="the end of its scale"):
+        check_range(99.0, 1.0, 100.0)

@@ -18,12 +18,14 @@ from palpate.force import ForceLoop
 from palpate.force.arm import Limits, ServoLoop, load_arm
 from palpate.force.gains import gains_for
 from palpate.press.cell import Reading, WristSensor, read_sensor
+from palpate.press.engines import press_gains
 from palpate.press.prepare import PressSpec, prepare_press, surface_of
 from palpate.press.pressing import press
 from palpate.press.sequence import CautiousDriver, Plan
 from palpate.press.setting import cell_of, check_able
 from palpate.press.simulated_arm import SimulatedArm
-from palpate.press.summary import summarise
+from palpate.press.summary import PressRequest, summarise
+from palpate.records import Record
 
 PLAIN = ("press", "--arm", "fr3", "--force", "20:N", "--surface", "K=5000,B=50")
 
@@ -339,3 +341,18 @@ def test_only_mujoco_knows_the_damping_of_its_joints(tmp_path):
     damped = pressing.run()
     free = prepare_press(question(arm=str(path), site="hand", seconds=0.4)).run()
     assert damped["x"][1000] < free["x"][1000] - 1e-5  # the approach is slower
+
+
+def test_the_age_of_a_fast_sensors_reading_is_its_delay():
+    """A sensor of 1010 Hz at 1 kHz: the age grows from 0 to a period of the sensor ten times a second."""
+    gains = press_gains(load_arm("fr3"), 20.0)
+    sensor = msgspec.structs.replace(gains.arm.sensor, sampling=1010.0)
+    gains = msgspec.structs.replace(gains, arm=msgspec.structs.replace(gains.arm, sensor=sensor))
+    request = PressRequest(None, gains, None, None, "cautious", "own", 0, ())
+    t = np.arange(1000) / 1000.0
+    random = np.random.default_rng(0).normal(size=1000)
+    record = Record({"t": t, "force_sampled": random}, {"t": "s", "force_sampled": "N"}, {})
+    assert request.delay(record) == pytest.approx(0.5 / 1010.0, rel=0.02)
+    assert request.delay_std(record) == pytest.approx(1.0 / 1010.0 / np.sqrt(12.0 * 10.0), rel=0.07)
+    held = replace(record, columns={"t": t, "force_sampled": np.repeat(np.arange(100.0), 10)})
+    assert request.delay(held) == 0.0

@@ -27,18 +27,8 @@ class LocalCluster:
     def start(self, workers):
         """So many more workers, of one thread each."""
         for _ in range(workers):
-            self.workers.append(
-                _started(
-                    "dask_worker",
-                    self.address,
-                    "--nthreads",
-                    "1",
-                    "--no-nanny",
-                    "--no-dashboard",
-                    *self._words,
-                    place=self._place,
-                )
-            )
+            words = (self.address, "--nthreads", "1", "--no-nanny", "--no-dashboard", *self._words)
+            self.workers.append(_started("dask_worker", *words, place=self._place))
 
     def stop(self):
         """Kills whatever is left."""

@@ -13,29 +13,46 @@ import socket
 import struct
 import sys
 import time
+from collections import deque
 
 PORTS = {"rtde": (30004, 30003, 29999), "franka": (1337,)}
-DELAY, LOST = 0.8, 0.1
-"""[s], and a share."""
+DELAY, LOST, DISORDER = 0.8, 0.1, 0.03
+"""[s]; a fraction; the largest delay of a packet that others overtake [s]."""
+REPLAYED = 50
+"""Packets before the fault that are said again and again after it."""
 
 
 class Spoiler:
     """What becomes of a packet of the arm's.
 
     Args:
-        fault: `garbage`, `delay` or `loss`.
+        fault: `garbage`, `flip` (one bit of each packet), `replay`, `reorder`, `delay` or `loss`.
     """
 
     def __init__(self, fault):
         self.fault, self.on, self.rng = fault, False, random.Random(0)
+        self.past, self.count = deque(maxlen=REPLAYED), 0
 
     def __call__(self, data):
         """When to send what: pairs of a time [s] and bytes."""
-        if self.on and self.fault == "loss" and self.rng.random() < LOST:
+        if not self.on:
+            self.past.append(data)
+            return [(time.monotonic(), data)]
+        if self.fault == "loss" and self.rng.random() < LOST:
             return []
-        if self.on and self.fault == "garbage":
-            data = self.rng.randbytes(len(data))
-        return [(time.monotonic() + (DELAY if self.on and self.fault == "delay" else 0.0), data)]
+        self.count += 1
+        delay = {"delay": DELAY, "reorder": DISORDER * self.rng.random()}.get(self.fault, 0.0)
+        return [(time.monotonic() + delay, self.spoiled(data))]
+
+    def spoiled(self, data):
+        if self.fault == "garbage":
+            return self.rng.randbytes(len(data))
+        if self.fault == "replay":
+            return self.past[self.count % len(self.past)]
+        if self.fault == "flip":
+            bit = self.rng.randrange(8 * len(data))
+            return (int.from_bytes(data, "big") ^ 1 << bit).to_bytes(len(data), "big")
+        return data
 
 
 class Relay:

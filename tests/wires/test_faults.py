@@ -24,18 +24,8 @@ from wires.slow_cell import DOMAIN, KINDS, WORDS, standing, while_it_presses
 def simulated(folders, **world):
     """An arm in simulated time, and the words of a press with it."""
     with simulated_arm(folders[100], **world) as network:
-        yield (
-            network,
-            [
-                "press",
-                "--wire",
-                network.address,
-                "--gains",
-                str(folders[100] / "gains.toml"),
-                *WORDS,
-                "--json",
-            ],
-        )
+        gains = str(folders[100] / "gains.toml")
+        yield network, ["press", "--wire", network.address, "--gains", gains, *WORDS, "--json"]
 
 
 def said(capsys):

@@ -11,7 +11,7 @@ from tool_axis_arm import REST, ToolAxisArm
 from palpate.errors import InputError
 from palpate.force import ForceLoop, load_arm
 from palpate.force.simulated_press import surface
-from palpate.wires import ArmReading, ConnectionLostError, PressLimits, PressTask, Rows, check_order, press
+from palpate.wires import ArmReading, PressLimits, PressTask, Rows, check_order, press
 from palpate.wires.order import safe_travel
 from wires.slow_cell import servo_cell
 
@@ -123,25 +123,6 @@ def test_a_force_that_stands_still_ends_the_press_as_that_and_is_shown(folder):
     assert outcome.troubles[outcome.ended] >= 10
 
 
-@pytest.mark.parametrize(
-    ("lie", "says"),
-    [
-        (force(lambda now, first: math.nan), "no number"),
-        (lambda sense, first: sense._replace(quaternion=(0.0,) * 4), "a quaternion of length 0"),
-        (lambda sense, first: sense._replace(quaternion=(1e200, 0.0, 0.0, 0.0)), "no orientation"),
-        (lambda sense, first: sense._replace(stamp=5.0 * sense.stamp - 4.0 * first.stamp), "run too fast"),
-        (lambda sense, first: sense._replace(stamp=first.stamp - 1.0), "went back"),
-        (lambda sense, first: sense._replace(position=(0.4, 0.0, 1e200)), "from the start"),
-    ],
-)
-def test_a_reading_that_is_none_ends_the_press_with_its_reason(folder, lie, says):
-    outcome, wire, rows = lying(folder, lie)
-    assert not outcome.ok
-    assert says in outcome.ended
-    assert rows.count <= len(wire.sent)  # the retreat has commands without a reading
-    assert retreat_of(wire)
-
-
 class LatePlaces:
     """A lie: each position is one of up to six ticks ago, at random, and never older than the one before.
 
@@ -203,21 +184,6 @@ def test_a_law_that_fails_sends_nothing_that_is_not_within_the_limits(folder, mo
     assert all(np.linalg.norm(command.velocity) <= 0.05 for command in wire.sent)
 
 
-@pytest.mark.parametrize(
-    "error", [RuntimeError("a defect"), KeyboardInterrupt(), MemoryError(), SystemExit(3)]
-)
-def test_whatever_is_raised_the_arm_is_told_to_rest(folder, monkeypatch, error):
-    def raising(self, *words):
-        raise error
-
-    did: list[str] = []
-    monkeypatch.setattr(ForceLoop, "update", raising)
-    monkeypatch.setattr(FakeWire, "stop", lambda self: did.append("stop"))
-    with pytest.raises(type(error)):
-        lying(folder)
-    assert did[-1] == "stop"
-
-
 def test_a_louder_sensor_is_tuned_for_and_said(folder):
     shown: list[str] = []
     outcome, _, _ = lying(folder, noise=0.5, shown=shown)
@@ -230,14 +196,6 @@ def test_a_sensor_that_drifts_moves_nothing(folder):
     drifts = lambda sense, first: sense._replace(force=(0.0, 0.0, sense.force[2] + 2.0 * sense.stamp))  # noqa: E731
     with pytest.raises(InputError, match="the force drifts by"):
         lying(folder, drifts, since=0.0)
-
-
-def test_a_wire_that_is_lost_ends_the_press(folder):
-    def gone(sense, first):
-        raise ConnectionLostError("the controller has closed the connection")
-
-    outcome, _, _ = lying(folder, gone)
-    assert outcome.ended == "the controller has closed the connection"
 
 
 @pytest.fixture(scope="module")

@@ -155,38 +155,6 @@ def test_losses_and_jitter_that_it_can_bear_are_counted(folder, here, capsys):
     assert told["force_N"] == pytest.approx(10.0, rel=0.1)
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (("--force-limit", "11:N", "--seconds", "10"), "above the limit of 11 N"),
-        (("--travel-limit", "0.5:mm", "--retreat", "0:mm"), "beyond the limit of 0.5 mm"),
-        (("--time-limit", "2.6:s", "--seconds", "2"), "the time limit of 2.6 s is over"),
-        (("--normal", "0,0,1", "--travel-limit", "1:mm", "--retreat", "0:mm"), "beyond the limit of 1 mm"),
-    ],
-)
-def test_each_limit_stops_the_arm(folder, here, capsys, words, says):
-    own = [*WORDS, *words]
-    world = {"stiffness": 9000.0, "damping": 0.0} if "11:N" in words else {"gap": 0.05}
-    if "11:N" in words:  # with the noise of a sensor that is worse than told, a press passes a limit so near
-        own = [w if w != "10:N" else "10.8:N" for w in own]
-    with simulated_arm(folder, **world) as network:
-        told = press_with(capsys, folder, network.address, own)
-    assert says in told["ended"]
-
-
-def press_with(capsys, folder, address, words):
-    merged: dict[str, str] = {}
-    words = list(words)
-    while words:
-        flag = words.pop(0)
-        merged[flag] = words.pop(0) if words and not words[0].startswith("--") else ""
-    flat = [w for pair in merged.items() for w in pair if w]
-    code = main(["press", "--wire", address, "--gains", str(folder / "gains.toml"), *flat, "--json", "--yes"])
-    told = json.loads(capsys.readouterr().out)
-    assert code == 1
-    return told
-
-
 def test_a_second_master_is_refused(folder, here, capsys):
     with simulated_arm(folder) as network:
         first = network.open(network.address)

@@ -31,13 +31,13 @@ def folders(tmp_path_factory):
     return made
 
 
-def spoiled_press(kind, fault, folder, where, *more):
+def spoiled_press(kind, fault, folder, where):
     """Exit code, the JSON that was printed, what else was, the loop's lag and the time from the fault to the end."""
     if find_spec(LIBRARIES[kind]) is None:
         pytest.skip(f"{LIBRARIES[kind]} is not installed")
     theta = ForceLoop.load(folder / "gains.toml").gains.theta
     arm = (REHEARSAL / f"{kind}_arm.py", "--address", ARM, "--arm", folder / "arm.toml", "--seconds", "60")
-    with child(*arm, "--gap", "0.002", *more) as (_, line), child(RELAY, kind, OWN, ARM, fault) as (relay, _):
+    with child(*arm, "--gap", "0.05") as (_, line), child(RELAY, kind, OWN, ARM, fault) as (relay, _):
         assert line == f"{kind}:{ARM}"
         words = [
             "press",
@@ -59,29 +59,17 @@ def spoiled_press(kind, fault, folder, where, *more):
     return told, theta, took
 
 
-@pytest.mark.parametrize("fault", ["delay", "garbage"])
+@pytest.mark.parametrize("fault", ["replay", "garbage"])
 @pytest.mark.parametrize("kind", ["rtde", "franka"])
 def test_a_spoiled_wire_ends_the_press_in_time_and_loses_nothing(folders, tmp_path, kind, fault):
-    told, theta, took = spoiled_press(kind, fault, folders[kind], tmp_path, "--gap", "0.05")
+    told, theta, took = spoiled_press(kind, fault, folders[kind], tmp_path)
     found = json.loads(told.stdout)
     assert told.returncode == 1
     assert found["ended"].count("\n") == 0
-    assert "no reading" in found["ended"] or "controller" in found["ended"] or "late" in found["ended"], (
-        found["ended"]
+    assert any(why in found["ended"] for why in ("no reading", "controller", "late", "clock went back")), (
+        found
     )
     # An arm that its watchdog has stopped is taken over again for the retreat, for which a controller may take 12 s.
     # Then two seconds for the stop and two to close; the rest is a busy machine's.
     assert took < theta + 12.0 + 7.0
     assert len(read_record(tmp_path / "rec" / "record.parquet")) == found["lateness"]["ticks"] > 20
-
-
-@pytest.mark.parametrize("kind", ["rtde", "franka"])
-def test_packets_that_are_lost_are_counted_and_borne(folders, tmp_path, kind):
-    told, _, _ = spoiled_press(kind, "loss", folders[kind], tmp_path, "--stiffness", "4000")
-    found = json.loads(told.stdout)
-    assert found["lateness"]["missed"] > 10
-    assert len(read_record(tmp_path / "rec" / "record.parquet")) == found["lateness"]["ticks"]
-    if kind == "franka" and "the controller: " in found["ended"]:
-        return  # a relay that is starved for 20 ms makes the controller itself end the motion: as it should be
-    assert told.returncode == 0, found["ended"]
-    assert found["force_N"] == pytest.approx(10.0, rel=0.1)

@@ -109,15 +109,6 @@ def test_a_force_limit_on_a_soft_layer_over_a_hard_one_leaves_no_force(folder, s
     assert run.retreat.max() <= speed * (1.0 + 1e-9)
 
 
-def test_the_same_wire_presses_again_after_a_force_limit(folder):
-    first = Run(folder, force=25.0)
-    assert not first.outcome.ok
-    again = Run(folder, wire=first.wire, desired=8.0, force=25.0, speed=0.05)
-    assert again.outcome.ok, again.outcome.ended
-    assert again.outcome.touched
-    assert again.force_later == 0.0
-
-
 def nothing(wire, sense):
     raise NoReadingError("", 0.01)
 

@@ -30,12 +30,13 @@ def prepare() -> None:
     """Make the streams of this process ready for any text.
 
     A stream that was closed before the program began is opened to the null device: otherwise the next opened file
-    would take its descriptor. A letter that the encoding lacks is escaped.
+    would take its descriptor. Standard output then takes nothing, so that no answer is lost without a word. A letter
+    that the encoding lacks is escaped.
     """
     codecs.register_error(_ERRORS, _replace_letters)
     for name, number, mode in (("stdin", 0, "r"), ("stdout", 1, "w"), ("stderr", 2, "w")):
         if getattr(sys, name) is None:
-            _redirect_to_null(number)
+            _redirect_to_null(number, os.O_RDONLY if name == "stdout" else os.O_RDWR)
             setattr(sys, name, open(number, mode, encoding="utf-8", closefd=False))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
@@ -102,8 +103,8 @@ def drop(stream: TextIO) -> None:
         stream.flush()
 
 
-def _redirect_to_null(number: int) -> None:
-    nowhere = os.open(os.devnull, os.O_RDWR)
+def _redirect_to_null(number: int, mode: int = os.O_RDWR) -> None:
+    nowhere = os.open(os.devnull, mode)
     if nowhere != number:
         os.dup2(nowhere, number)
         os.close(nowhere)
@@ -257,6 +258,7 @@ _REMEDIES = {
     errno.ENOTDIR: "check the path: one of its folders is a file",
     errno.EISDIR: "name a file, not a folder",
     errno.EEXIST: "choose another name",
+    errno.EBADF: "standard output is closed: redirect it, as with: > FILE",
 }
 
 
@@ -286,7 +288,7 @@ def _exit_code(error: BaseException) -> int:
     match error:
         case SystemExit(__context__=BrokenPipeError()):  # rich's way of saying it
             return READER_GONE
-        case SystemExit():
+        case SystemExit() if not _own_code_fails(error):
             return error.code if isinstance(error.code, int) else DONE
         case KeyboardInterrupt():
             return _say("interrupted", INTERRUPTED)
@@ -307,14 +309,20 @@ def _exit_code(error: BaseException) -> int:
 
 def _report_defect(error: BaseException) -> int:
     """Print the traceback of a defect; what the user's own code raises beside Exceptions is one line."""
-    if not isinstance(error, Exception):
-        from palpate.plugins import reason, where_it_fails
+    if _own_code_fails(error):
+        from palpate.plugins import reason
 
-        if where_it_fails(error):
-            return _say(f"{reason(error)}; let your code raise an Exception, or end by itself", WRONG_INPUT)
+        return _say(f"{reason(error)}; let your code raise an Exception, or end by itself", WRONG_INPUT)
     with suppress(OSError):
         sys.stderr.write(printable("".join(traceback.format_exception(error))))
     return _say("this is a defect of palpate; please report the lines above", DEFECT)
+
+
+def _own_code_fails(error: BaseException) -> bool:
+    """True for an exit, or another error beside Exceptions, that the user's own code raised."""
+    from palpate.plugins import where_it_fails
+
+    return not isinstance(error, Exception) and where_it_fails(error) != ""
 
 
 def _say(text: str, code: int, longest: int = LONGEST) -> int:

@@ -80,7 +80,7 @@ class Streaming(Readable, ABC):
         if not self._one(self._state, phi, y, self._policy, self._size):
             raise InputError(
                 "a sample must be finite numbers up to 1e30, leave it out; "
-                f"got regressor {regressor!r}, force {force!r}"
+                f"got regressor {phi.tolist()}, force {y:g}"
             )
 
     def update_many(self, regressors: ArrayLike, forces: ArrayLike) -> None:
@@ -94,7 +94,7 @@ class Streaming(Readable, ABC):
         done = self._many(self._state, phi, y, self._policy, self._size)
         if done < len(y):
             raise InputError(
-                f"sample {done} is not finite: regressor {phi[done]}, force {y[done]}; "
+                f"sample {done} is not finite: regressor {phi[done].tolist()}, force {y[done]}; "
                 f"the {done} before it were taken in"
             )
 

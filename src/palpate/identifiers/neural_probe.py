@@ -145,7 +145,12 @@ class NeuralProbe(Readable):
         signals = self._memory.signals.copy()
         signals[:3] = self.scale * x
         forward(self._net.sizes, self._memory.weights, signals)
-        return float(self._net.amplitude[0] * signals[-1])
+        answer = float(self._net.amplitude[0] * signals[-1])
+        if not np.isfinite(answer):
+            raise InputError(
+                f"the network gives no finite force for the regressor {x.tolist()}; give a smaller one"
+            )
+        return answer
 
     def probe(
         self,
@@ -207,7 +212,7 @@ class NeuralProbe(Readable):
         self.samples += done
         if done < len(y):
             raise InputError(
-                f"sample {done} is not finite: regressor {phi[done]}, force {y[done]}; leave it out "
+                f"sample {done} is not finite: regressor {phi[done].tolist()}, force {y[done]}; leave it out "
                 f"(the {done} before it were taken in)"
             )
         return out

@@ -129,11 +129,15 @@ class Perceptron:
     @staticmethod
     def _check(values: ArrayLike, n: int, name: str) -> Array:
         array = cast_array(name, values, (n,))
-        if not np.isfinite(array).all():
-            raise InputError(f"{name} must be finite, got {array}; leave the sample out")
+        if not (np.abs(array) <= LARGEST).all():
+            raise InputError(
+                f"{name} must be finite, up to {LARGEST:g}, got {array.tolist()}; leave the sample out"
+            )
         return array
 
 
+LARGEST = 1e30
+"""Largest input or error of one sample, as of the estimators: products of three of them are floats."""
 THESIS_AMPLITUDE = (20.0, 10.0, 1.0)
 """Of the outputs of the thesis' controller [N, N, N m]."""
 

@@ -120,7 +120,11 @@ class Cluster:
         Raises:
             InputError: the scheduler went away, or the workers cannot run palpate.
         """
-        return self.map(partial(run_on_worker, stamp=sources()), map(pack, jobs), _killed_row)
+        return self.map(
+            partial(run_on_worker, stamp=sources()),
+            map(pack, jobs),
+            lambda packed, error: packed.job().row(FAILED, f"workers died of it: {error}"),
+        )
 
     def map(
         self, work: Callable[[A], B], items: Iterable[A], killed: Callable[[A, str], B] | None = None
@@ -188,10 +192,6 @@ def _wait(completed: Any, limit: float, send_again: Callable[[], None]) -> None:
             send_again()
             limit *= QUIET_FACTOR
         time.sleep(POLL)
-
-
-def _killed_row(packed: PackedJob, error: str) -> Row:
-    return packed.job().row(FAILED, f"workers died of it: {error}")
 
 
 def _first_line(error: BaseException) -> str:
