@@ -18,9 +18,7 @@ from palpate.controllers.hybrid import Hybrid, HybridController
 from palpate.controllers.impedance import Impedance, ImpedanceController
 from palpate.controllers.neural import Neural, NeuralController
 from palpate.controllers.proportional_integral import ProportionalIntegral, ProportionalIntegralController
-from palpate.controllers.raibert_craig import RaibertCraig, RaibertCraigController
 from palpate.controllers.resolved_acceleration import ResolvedAcceleration
-from palpate.controllers.self_tuning import SelfTuning, SelfTuningController
 
 __all__ = [
     "AnyController",
@@ -37,11 +35,7 @@ __all__ = [
     "NeuralController",
     "ProportionalIntegral",
     "ProportionalIntegralController",
-    "RaibertCraig",
-    "RaibertCraigController",
     "ResolvedAcceleration",
-    "SelfTuning",
-    "SelfTuningController",
     "alone",
     "cautious_on_bench",
     "controller",

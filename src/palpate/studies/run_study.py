@@ -141,8 +141,6 @@ def _combinations(plan: RunPlan) -> Iterator[Experiment]:
     for values in islice(corner_values(plan), MAX_TRIED):
         try:
             experiment = plan.experiment(values)
-            if not isinstance(experiment, Experiment):
-                continue  # an experiment along one direction has no parts of the user's
             build(experiment)
         except PluginError:
             raise

@@ -11,9 +11,8 @@ from palpate.identification.result import Identification
 from palpate.records import Record
 from palpate.report import style
 from palpate.report.chart import Chart, build_figure, panels
-from palpate.report.page import Answer, Table, answer_page
+from palpate.report.page import Answer, answer_page
 from palpate.report.run.figures import run_figures
-from palpate.report.run.one_direction import one_direction_charts, one_direction_tables
 from palpate.report.run.table import alerts, sentence, tables
 from palpate.text import printable
 
@@ -41,7 +40,7 @@ def write_report(
         endings: of the figures' files, each of `style.FORMATS`.
         dpi: of a PNG; `style.DPI` if none is given.
     """
-    figures = charts_of_run(record, summary)
+    figures = run_figures(record)
     captions = {}
     for name, (charts, caption) in figures.items():
         drawing = build_figure(charts)
@@ -50,21 +49,6 @@ def write_report(
             captions[f"{name}{ending}"] = caption
     write_text(folder / "report.html", page(record, summary, identification, source, figures))
     return captions
-
-
-def charts_of_run(record: Record, summary: dict[str, Any]) -> dict[str, tuple[list[Chart], str]]:
-    """The charts of each figure and its caption, by the figure's name, in the order to be read."""
-    if "loop" not in record.meta:
-        return run_figures(record)
-    return one_direction_charts(record) if summary["force"] is not None else {}
-
-
-def tables_of_run(
-    record: Record, summary: dict[str, Any], identification: Identification | None
-) -> list[Table]:
-    """The tables of a run, on the terminal and on its page."""
-    one_direction = "loop" in record.meta
-    return one_direction_tables(record, summary) if one_direction else tables(summary, identification)
 
 
 def page(
@@ -91,7 +75,7 @@ def page(
             )
         ),
         alerts=alerts(summary),
-        tables=tables_of_run(record, summary, identification),
+        tables=tables(summary, identification),
         figures=[{"panels": panels(charts), "caption": caption} for charts, caption in shown_figures],
         source=("The experiment", source),
     )
