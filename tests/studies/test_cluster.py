@@ -3,10 +3,7 @@
 import json
 import os
 import shutil
-import signal
 import subprocess
-import threading
-import time
 
 import dask
 import pytest
@@ -60,21 +57,6 @@ def test_two_workers_make_the_table_that_threads_make_and_one_may_die(cluster, t
     runner.close()
     assert (tmp_path / "out" / "results.parquet").read_bytes() == here
     assert cluster.workers[0].wait() != 0
-
-
-@pytest.mark.long
-def test_the_runs_of_a_frozen_worker_are_sent_again(tmp_path, here):
-    with local_cluster(tmp_path, workers=2) as running:
-        frozen = running.workers[0]
-        killer = threading.Timer(0.3, lambda: frozen.send_signal(signal.SIGSTOP))
-        killer.start()
-        begin = time.monotonic()
-        try:
-            assert on(running.address, tmp_path / "out") == here
-            assert time.monotonic() - begin < 60.0
-        finally:
-            killer.join()
-            frozen.send_signal(signal.SIGCONT)
 
 
 @pytest.mark.long
@@ -147,13 +129,14 @@ def test_a_worker_with_other_sources_refuses():
 
 
 @pytest.mark.long
-def test_a_run_that_kills_workers_has_a_result_of_its_own(tmp_path):
+def test_a_run_that_kills_workers_has_a_result_of_its_own(tmp_path, monkeypatch):
     with local_cluster(tmp_path, workers=6) as running:
         runner = Cluster(running.address)
-        (found,) = runner.map(os._exit, [7], lambda item, why: (item, why))
+        monkeypatch.setattr(clusters, "run_on_worker", lambda packed, stamp: os._exit(7))
+        (row,) = runner.run(jobs(1))
         runner.close()
-    assert found[0] == 7
-    assert "died" in found[1]
+    assert row.result == "failed"
+    assert "workers died of it" in row.why
 
 
 @pytest.mark.long

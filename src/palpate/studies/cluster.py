@@ -4,29 +4,19 @@ from __future__ import annotations
 
 import logging
 import pickle
-import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from palpate.errors import InputError, how_to_install
 from palpate.plugins import Plugin
 from palpate.studies.journal import Row, differences, sources
 from palpate.studies.run_one import FAILED, RunJob, run_one
 
-A = TypeVar("A")
-B = TypeVar("B")
-
 MAX_SENT = 1000
 """Tasks at the cluster at most: enough for hundreds of workers, little memory."""
 PATIENCE = 30.0
 """Time within which a cluster must have a worker [s]."""
-QUIET, QUIET_FACTOR = 5.0, 3.0
-"""Time without a result [s], and its multiple of the longest one before, after which a task that a worker has is sent
-again: the worker may be frozen. A task gives the same result wherever it runs, and the first one counts."""
-POLL = 0.01
-"""Time between two looks for a result [s]."""
 CONNECT = 10.0
 """Time within which a scheduler must answer [s]."""
 
@@ -120,54 +110,25 @@ class Cluster:
         Raises:
             InputError: the scheduler went away, or the workers cannot run palpate.
         """
-        return self.map(partial(run_on_worker, stamp=sources()), map(pack, jobs), _killed_row)
+        waiting, stamp, sent = iter(jobs), sources(), {}
 
-    def map(
-        self, work: Callable[[A], B], items: Iterable[A], killed: Callable[[A, str], B] | None = None
-    ) -> Iterator[B]:
-        """Results of `work`, a function that the workers can import, in the order of completion.
-
-        Args:
-            work: of an item.
-            items: taken as they are needed.
-            killed: the result of an item of which several workers died, with the last error; an error if left out.
-
-        Raises:
-            InputError: the scheduler went away, or the workers cannot do it.
-        """
-        waiting = enumerate(items)
-        unfinished: dict[int, A] = {}
-        sent: dict[Any, int] = {}
-
-        def send(tasks: Iterable[tuple[int, A]]) -> list[Any]:
+        def send(count: int) -> list[Any]:
             futures = []
-            for number, item in tasks:
-                future = self._client.submit(work, item, pure=False)
-                unfinished[number], sent[future] = item, number
-                futures.append(future)
+            for job in islice(waiting, count):
+                futures.append(self._client.submit(run_on_worker, pack(job), stamp, pure=False))
+                sent[futures[-1]] = job
             return futures
 
         try:
-            completed = self._dask.as_completed(send(islice(waiting, MAX_SENT)), loop=self._client.loop)
-            longest = 0.0
-            while unfinished:
-                begin = time.monotonic()
-                limit = max(QUIET, QUIET_FACTOR * longest)
-                _wait(completed, limit, lambda: completed.update(send(list(unfinished.items()))))
-                longest = max(longest, time.monotonic() - begin)
-                future = next(completed)
-                number = sent.pop(future)
-                if number not in unfinished:  # a task that was sent twice
-                    continue
-                item = unfinished.pop(number)
+            completed = self._dask.as_completed(send(MAX_SENT), loop=self._client.loop)
+            for future in completed:
+                job = sent.pop(future)
                 try:
-                    result: B = future.result()
+                    row: Row = future.result()
                 except self._dask.KilledWorker as error:
-                    if killed is None:
-                        raise
-                    result = killed(item, _first_line(error))
-                yield result
-                completed.update(send(islice(waiting, 1)))
+                    row = job.row(FAILED, f"workers died of it: {_first_line(error)}")
+                yield row
+                completed.update(send(1))
         except InputError:
             raise
         except Exception as error:
@@ -178,20 +139,6 @@ class Cluster:
         finally:
             if sent and self._client.status == "running":
                 self._client.cancel(list(sent), force=True)
-
-
-def _wait(completed: Any, limit: float, send_again: Callable[[], None]) -> None:
-    """Wait for a result; after each time without one [s], ever longer ones, the tasks are sent again."""
-    begin = time.monotonic()
-    while not completed.has_ready():
-        if time.monotonic() - begin > limit:
-            send_again()
-            limit *= QUIET_FACTOR
-        time.sleep(POLL)
-
-
-def _killed_row(packed: PackedJob, error: str) -> Row:
-    return packed.job().row(FAILED, f"workers died of it: {error}")
 
 
 def _first_line(error: BaseException) -> str:
