@@ -13,12 +13,16 @@ from palpate.controllers.controller import (
     controller_of,
     join,
 )
-from palpate.controllers.decoupled_hybrid import DecoupledHybrid, DecoupledHybridController
-from palpate.controllers.hybrid import Hybrid, HybridController
+from palpate.controllers.hybrid import (
+    DecoupledHybrid,
+    DecoupledHybridController,
+    Hybrid,
+    HybridController,
+    ResolvedAcceleration,
+)
 from palpate.controllers.impedance import Impedance, ImpedanceController
 from palpate.controllers.neural import Neural, NeuralController
 from palpate.controllers.proportional_integral import ProportionalIntegral, ProportionalIntegralController
-from palpate.controllers.resolved_acceleration import ResolvedAcceleration
 
 __all__ = [
     "AnyController",

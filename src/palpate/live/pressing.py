@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from palpate.arrays import Array
 from palpate.bench.summary import CONTACT, DIVERGED, LOST
-from palpate.environments.kelvin_voigt import KelvinVoigt
+from palpate.environments.models import KelvinVoigt
 from palpate.errors import InputError
 from palpate.force import ForceLoop
 from palpate.force.gains import Gains
