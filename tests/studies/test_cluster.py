@@ -10,10 +10,9 @@ import pytest
 
 from palpate.cli import main
 from palpate.errors import InputError
-from palpate.studies import cluster as clusters
-from palpate.studies.cluster import Cluster, pack, run_on_worker
+from palpate.studies import run_one as clusters
 from palpate.studies.journal import sources
-from palpate.studies.run_one import Local, RunJob
+from palpate.studies.run_one import Cluster, Local, RunJob, pack, run_on_worker
 from palpate.studies.run_study import Work
 from studies.cluster import local_cluster
 from studies.small import SMALL, planned, text

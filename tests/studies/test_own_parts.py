@@ -9,10 +9,9 @@ from own_parts import controller
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.studies import run
-from palpate.studies.cluster import pack, run_on_worker
 from palpate.studies.journal import head_of, sources
 from palpate.studies.plan import plan_runs
-from palpate.studies.run_one import RunJob, run_one
+from palpate.studies.run_one import RunJob, pack, run_on_worker, run_one
 from palpate.studies.study import parse
 from studies.small import NEAR, text
 

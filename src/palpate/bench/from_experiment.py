@@ -25,7 +25,7 @@ from palpate.controllers import ResolvedAcceleration, controller_of
 from palpate.environments import StickSlip, surface_of
 from palpate.errors import InputError, PartError
 from palpate.friction import Coulomb, LuGre
-from palpate.identifiers.kernels.least_squares import LeastSquares
+from palpate.identifiers.least_squares import LeastSquares
 from palpate.instruments import Converter, Encoder
 from palpate.references import NO_WAVE, Approach, Chirp, ForceSchedule, Multisine
 from palpate.robots.arm3 import MOTOR_TORQUE, Arm3

@@ -111,7 +111,7 @@ def _run(
     """Run an experiment, and write the folder of results."""
     from palpate.bench.summary import summarise
     from palpate.logs.tables.parquet import write_record
-    from palpate.report.run.page import write_report
+    from palpate.report.run.figures import write_report
 
     with fresh_folder(folder, replace=output.replace) as fresh:
         command = printable(f"palpate run {shlex.quote(request.name)} --seed {request.seed}")

@@ -57,7 +57,7 @@ class ClusterOptions:
 
             yield Local(waiting=waiting)
             return
-        from palpate.studies.cluster import Cluster
+        from palpate.studies.run_one import Cluster
 
         cluster = Cluster(self.scheduler)
         try:
