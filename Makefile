@@ -58,6 +58,7 @@ check: lint test ## everything that has to pass before a commit
 bench: .venv/dev.stamp ## measure what a tick and a cold start cost here
 	$(BIN)/palpate speed
 	$(BIN)/python benchmarks/c_yardstick/compare.py
+	$(BIN)/python benchmarks/side_by_side.py
 	$(BIN)/python benchmarks/cold_start.py
 	$(BIN)/python benchmarks/arms/tick.py
 

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from others import Filterpy, Padasip
 from pressing import NOISE, START, TONES, VAGUE, Array, followed, motion, regressors, samples_to_know
 
 from palpate.bench import ForceSensorTable, given_motion
@@ -31,10 +32,13 @@ from palpate.signals.low_pass import LowPass
 BEFORE, AFTER = (60.0, 7e3), (150.0, 62e3)  # B [N s/m], K [N/m]
 RATE, LOOP = 480.0, 1000.0
 SECONDS, CHANGE = 10.0, 4.0  # of a run, and from when on the surface is the other [s]
+DRIFT = (10.0, 5e3, 10.0)  # of B, K and the offset [a root second]
 ESTIMATORS: dict[str, Callable[[], Any]] = {
     "restarting": lambda: RestartingLeastSquares(START, VAGUE),
     "exponential 0.995": lambda: RecursiveLeastSquares(START, VAGUE, 0.995),
     "SIFt 0.99": lambda: RecursiveLeastSquares(START, VAGUE, SIFt(0.99)),
+    "padasip 0.995": lambda: Padasip(START, VAGUE, 0.995),
+    "filterpy, Kalman": lambda: Filterpy(START, VAGUE, DRIFT, 1.0 / RATE, NOISE),
 }
 SETTLED = 10.0  # time constants after which a low-pass has forgotten
 FOUR = np.diag([1e2, 1e8, 1e12, 1e6])  # of M, B, K, offset in the chain

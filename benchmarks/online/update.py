@@ -1,4 +1,4 @@
-"""What one update from Python costs, three parameters, and what it buys, beside the textbook's in NumPy.
+"""What one update from Python costs, three parameters, and what it buys: ours and others' on the same samples.
 
     python benchmarks/online/update.py
 
@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from others import Filterpy, Network, Padasip, Thesis
 from pressing import NOISE, TONES, Array
 
 from palpate.identifiers import RecursiveLeastSquares, RestartingLeastSquares, SIFt
@@ -20,34 +21,16 @@ from palpate.identifiers import RecursiveLeastSquares, RestartingLeastSquares, S
 TRUTH = np.array([0.1, 200.0, 5200.0])  # M [kg], B [N s/m], K [N/m]: the thesis' foam
 START, VAGUE = np.zeros(3), np.diag([1e2, 1e6, 1e10])
 SAMPLES, ROUNDS, SEEDS = 400, 61, 60
-REFERENCE = "thesis, eq. 5.7-5.10"
-
-
-class Textbook:
-    """Recursive least squares as it stands in eq. 5.7-5.10 of the thesis, on arrays."""
-
-    def __init__(self, theta: Array, covariance: Array, forgetting: float):
-        self.theta, self._P, self._forgetting = theta.copy(), covariance.copy(), forgetting
-
-    def update(self, regressor: Array, force: float) -> None:
-        """Takes one sample in."""
-        gain = self._P @ regressor
-        scale = 1.0 / (self._forgetting + regressor @ gain)
-        self.theta = self.theta + gain * (scale * (force - regressor @ self.theta))
-        self._P = (self._P - scale * np.outer(gain, gain)) / self._forgetting
-
-    def update_many(self, regressors: Array, forces: Array) -> None:
-        """Takes k samples in, one at a time."""
-        for regressor, force in zip(regressors, forces.tolist(), strict=True):
-            self.update(regressor, force)
-
-
+NONE = (0.0, 0.0, 0.0)
 MAKERS: dict[str, Callable[[], Any]] = {
     "RecursiveLeastSquares": lambda: RecursiveLeastSquares(START, VAGUE),
     "  exponential 0.999": lambda: RecursiveLeastSquares(START, VAGUE, 0.999),
     "  SIFt 0.999": lambda: RecursiveLeastSquares(START, VAGUE, SIFt(0.999)),
     "RestartingLeastSquares": lambda: RestartingLeastSquares(START, VAGUE),
-    REFERENCE: lambda: Textbook(START, VAGUE, 1.0),
+    "padasip FilterRLS": lambda: Padasip(START, VAGUE, 1.0),
+    "filterpy KalmanFilter": lambda: Filterpy(START, VAGUE, NONE, 1e-3, NOISE),
+    "thesis, eq. 5.7-5.10": lambda: Thesis(START, VAGUE, 1.0),
+    "thesis, network": Network,
 }
 
 
@@ -101,12 +84,13 @@ def errors() -> dict[str, Array]:
 
 def main() -> None:
     taken, wrong = times(), errors()
-    print(f"{'':24}{'update':>10}{'/ textbook':>12}   rms error over the bound: M, B, K")
+    filterpy, padasip = taken["filterpy KalmanFilter"], taken["padasip FilterRLS"]
+    print(f"{'':24}{'update':>10}{'/ filterpy':>12}{'/ padasip':>12}   rms error over the bound: M, B, K")
     for name, seconds in taken.items():
         M, B, K = wrong[name]
         print(
-            f"{name:24}{1e6 * np.median(seconds):7.2f} us{np.median(seconds / taken[REFERENCE]):12.3f}"
-            f"   {M:10.3g}{B:10.3g}{K:10.3g}"
+            f"{name:24}{1e6 * np.median(seconds):7.2f} us{np.median(seconds / filterpy):12.3f}"
+            f"{np.median(seconds / padasip):12.3f}   {M:10.3g}{B:10.3g}{K:10.3g}"
         )
 
 
