@@ -8,7 +8,7 @@ import measure
 import pytest
 
 from live.conftest import PATIENCE, near, playing
-from live.test_server import Clock
+from live.test_server import Clock, shared
 from opened_pages import open_page
 from palpate.live.pressing import PressingArm
 from palpate.live.simulation import WatchedSimulation
@@ -87,6 +87,24 @@ def test_pause_stops_step_steps_and_reset_begins_again(browser, served_simulatio
         until(page, f"Math.abs(palpate.live.latest.t - {before} - 0.01) < 1e-9")
         page.click("#reset")
         until(page, f"palpate.live.state.playing && palpate.live.latest.t < {before}")
+
+
+def test_the_host_s_page_steers_and_the_audience_s_has_nothing_to_steer_by(browser):
+    """The audience's page is opened first."""
+    with shared(WatchedSimulation(near(), seed=1)) as (player, host, audience):
+        with opened(browser, audience) as watching, opened(browser, host) as steering:
+            until(watching, "document.body.classList.contains('watching') && palpate.live.rows > 10")
+            until(steering, "palpate.live.rows > 10")
+            assert not watching.get_by_role("slider").first.is_visible()
+            assert not watching.locator("#pause").is_visible()
+            watching.keyboard.press("Space")
+            until(watching, "document.getElementById('alerts').textContent.includes('only watches')")
+            assert steering.evaluate("palpate.live.state.playing")
+            steering.get_by_role("slider", name="surface K").fill("0.75")
+            until(watching, "Math.abs(palpate.live.latest.K_true / (5200 * 20 ** 0.5) - 1) < 1e-9")
+            assert steering.wrong == watching.wrong == []
+            assert watching.asked == [str(audience)]
+        assert player.failure is None
 
 
 def test_gone_and_back(browser):

@@ -5,7 +5,7 @@ import re
 import socket
 import threading
 import time
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -15,7 +15,7 @@ from live.conftest import PATIENCE, Stream, playing
 from palpate.errors import InputError
 from palpate.live import connections, server
 from palpate.live.player import Feed, Player
-from palpate.live.server import READERS, PageServer
+from palpate.live.server import AUDIENCE, PER_ADDRESS, READERS, PageServer
 from palpate.live.view import COLUMNS, SourceState, View
 
 
@@ -289,10 +289,29 @@ def test_threads_end_with_the_block():
     assert left == []
 
 
-def idle(address):
+NETWORK = "127.0.0.2"
+"""The loopback's second address stands for one on a network."""
+
+
+@contextmanager
+def shared(source):
+    """A shared page: its player, the address that steers, and the audience's."""
+    player = Player(source, Feed())
+    with player, PageServer(player) as host, PageServer(player, host=NETWORK, steers=False) as audience:
+        yield player, host, audience
+
+
+def listener(address, number):
+    """A stream of a machine of its own."""
+    return Stream(address, source_address=(f"127.0.1.{number}", 0))
+
+
+def idle(address, number=1):
     """A connection that asks for nothing."""
     parts = urlsplit(str(address))
-    return socket.create_connection((parts.hostname, parts.port), timeout=PATIENCE)
+    return socket.create_connection(
+        (parts.hostname, parts.port), timeout=PATIENCE, source_address=(f"127.0.2.{number}", 0)
+    )
 
 
 def dropped(connection):
@@ -303,17 +322,86 @@ def dropped(connection):
         return True
 
 
-def test_idle_connections_give_way_to_new_ones():
-    with playing(Clock()) as (_, address, client), ExitStack() as held:
-        lines = [held.enter_context(idle(address)) for _ in range(connections.MAX_WAITING)]
+def test_the_host_steers_whoever_came_first():
+    with shared(Clock()) as (_, host, audience):
+        assert str(audience).startswith(f"http://{NETWORK}:")
+        assert asked(audience)[0] == 200
+        assert asked(audience, Host="palpate.example")[0] == 403
+        watching = Stream(audience).until(lambda s: "watching" in s.kinds and s.state is not None)
+        steering = Stream(host).until(lambda s: s.state is not None)
+        watching.ask("set", key="speed", value=3.0)
+        watching.until(lambda s: "refused" in s.kinds)
+        assert watching.refused == "this page only watches"
+        steering.ask("set", key="speed", value=2.0)
+        steering.until(lambda s: s.state["values"]["speed"] == 2.0)
+        assert "watching" not in steering.kinds
+        watching.until(lambda s: s.state["values"]["speed"] == 2.0)
+        steering.close()
+        # Nobody inherits it, from the same machine or another, and the host's next page steers at once.
+        watching.ask("set", key="speed", value=4.0)
+        watching.until(lambda s: s.kinds.count("refused") == 2)
+        back = Stream(host)
+        back.ask("set", key="speed", value=5.0)
+        back.until(lambda s: s.state is not None and s.state["values"]["speed"] == 5.0)
+        watching.close()
+        back.close()
+
+
+def test_the_address_that_steers_is_not_on_the_network():
+    with shared(Clock()) as (_, host, audience):
+        assert host.host == "127.0.0.1"
+        assert host.token != audience.token
+        assert asked(audience, f"/{host.token}/")[0] == 403
+        assert asked(host, f"/{audience.token}/")[0] == 403
+        with pytest.raises(ConnectionError):
+            socket.create_connection((NETWORK, host.port), timeout=PATIENCE).close()
+
+
+def test_an_audience_of_any_size_leaves_the_host_its_place(monkeypatch):
+    from websockets.exceptions import InvalidStatus
+
+    monkeypatch.setattr(server, "ALIVE_TIMEOUT", PATIENCE)  # those here answer no ping
+    with shared(Clock()) as (_, host, audience), ExitStack() as held:
+        for number in range(AUDIENCE):
+            one = held.enter_context(idle(audience, 1 + number))
+            one.sendall(handshake(audience))
+            assert b"101" in one.recv(64)
+        with pytest.raises(InvalidStatus) as refused:
+            listener(audience, 200)
+        assert refused.value.response.status_code == 503
+        for number in range(200):
+            held.enter_context(idle(audience, 1 + number))
+        steering = Stream(host)
+        held.callback(steering.close)
+        steering.ask("set", key="speed", value=2.0)
+        steering.until(lambda s: s.state is not None and s.state["values"]["speed"] == 2.0)
+
+
+def test_one_address_takes_few_places():
+    with shared(Clock()) as (_, _host, audience), ExitStack() as held:
+        lines = [held.enter_context(idle(audience)) for _ in range(PER_ADDRESS + 1)]
+        assert dropped(lines[-1])
+        one = listener(audience, 1).until(lambda s: len(s.rows) > 5)  # another address has its own
+        one.close()
+        lines[0].close()
+        again = Stream(audience, source_address=("127.0.2.1", 0)).until(lambda s: len(s.rows) > 5)
+        again.close()
+
+
+@pytest.mark.parametrize("steers", [True, False])
+def test_idle_connections_give_way_to_new_ones(steers):
+    with shared(Clock()) as (_, host, audience), ExitStack() as held:
+        address = host if steers else audience
+        lines = [held.enter_context(idle(address, 1 + i)) for i in range(connections.MAX_WAITING)]
         assert asked(address)[0] == 200
         assert dropped(lines[0])
-        client().until(lambda s: len(s.rows) > 5)
+        one = listener(address, 1).until(lambda s: len(s.rows) > 5)
+        one.close()
 
 
 def test_an_idle_connection_is_dropped(monkeypatch):
     monkeypatch.setattr(server, "REQUEST_TIMEOUT", 0.2)
-    with playing(Clock()) as (_, address, _client), idle(address) as one, idle(address) as other:
+    with shared(Clock()) as (_, host, audience), idle(host) as one, idle(audience) as other:
         other.sendall(b"GET / HTTP/1.1\r\nHost: ")
         assert dropped(one)
         assert dropped(other)
@@ -325,13 +413,13 @@ def test_a_page_that_takes_nothing_or_answers_no_ping_loses_its_place(monkeypatc
     from websockets.exceptions import InvalidStatus
 
     monkeypatch.setattr(server, "ALIVE_TIMEOUT", 0.3)
-    monkeypatch.setattr(server, "READERS", 1)
+    monkeypatch.setattr(server, "AUDIENCE", 1)
     source, end = Clock(), time.monotonic() + PATIENCE
-    with playing(source) as (player, address, client), idle(address) as dead:
+    with shared(source) as (player, _, audience), idle(audience) as dead:
         dead.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
-        dead.sendall(handshake(address))
+        dead.sendall(handshake(audience))
         said = b""
-        while b"state" not in said:  # it has the place
+        while b"watching" not in said:  # it has the place
             said += dead.recv(64)
         while True:
             assert time.monotonic() < end
@@ -339,7 +427,7 @@ def test_a_page_that_takes_nothing_or_answers_no_ping_loses_its_place(monkeypatc
                 break
             player.feed.put(source.advance(2.0))
             with suppress(InvalidStatus):
-                client()
+                listener(audience, 1).close()
                 break
 
 
@@ -354,8 +442,9 @@ def handshake(address):
 
 def test_idle_connections_do_not_delay_the_end():
     with ExitStack() as held:
-        with playing(Clock()) as (_, address, _client):
-            held.enter_context(idle(address))
+        with shared(Clock()) as (_, host, audience):
+            for address in (host, audience):
+                held.enter_context(idle(address))
             time.sleep(0.1)
             begun = time.monotonic()
         assert time.monotonic() - begun < server.REQUEST_TIMEOUT / 2

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,6 +15,7 @@ from palpate.cli.toolkit import COMPILING, print_lines, say
 from palpate.errors import InputError, how_to_install
 
 if TYPE_CHECKING:
+    from palpate.live.player import Player
     from palpate.live.view import LiveSource
 
 _DEFAULT = "foam-hybrid"
@@ -36,12 +39,14 @@ class SimulationOptions:
 
 @options("Server", 7)
 class ServedOptions:
-    """Port of the page."""
+    """Port and addresses of the page."""
 
     port: Annotated[int, SIGNED] = 0
     "Port of the page; a free one if not given, or 0."
     open_: Annotated[bool, FLAG, Parameter(name="--open")] = False
     "Open the page in the browser."
+    share: Annotated[bool, FLAG] = False
+    "Share the page on the network of this machine, for a lecture: its second address only watches."
 
 
 def live(
@@ -59,7 +64,8 @@ def live(
     palpate live --arm fr3
 
     The first line printed is the page's address. It works on this machine only and without a network. It holds a
-    secret token: requests without it are refused.
+    secret token: requests without it are refused. --share prints a second address for the audience, which only
+    watches, on the network, and its QR code.
     """
     simulation, plugins, at = (
         simulation or SimulationOptions(),
@@ -99,18 +105,75 @@ def _experiment(simulation: SimulationOptions) -> LiveSource:
 
 
 def show_live(source: LiveSource, at: ServedOptions) -> int:
-    """Serve a simulation until Ctrl-C; the first line printed is the address of the page."""
-    if find_spec("websockets") is None:
-        raise InputError(f"the live page needs websockets: {how_to_install('palpate[live]')}")
+    """Serve a simulation until Ctrl-C; the first line printed is the address of the page that steers."""
+    if find_spec("websockets") is None or find_spec("segno") is None:
+        raise InputError(f"the live page needs websockets and segno: {how_to_install('palpate[live]')}")
     from palpate.live.player import Feed, Player, load_late_imports
     from palpate.live.server import PageServer
 
     load_late_imports()
-    with Player(source, Feed()) as player, PageServer(player, at.port) as address:
-        print_lines(str(address))
+    with (
+        Player(source, Feed()) as player,
+        PageServer(player, at.port) as address,
+        _audience(player, at) as lines,
+    ):
+        print_lines(str(address), *lines)
         if at.open_:
             import webbrowser
 
             webbrowser.open(str(address))
         player.wait()
     return 0
+
+
+WARNING = (
+    "shared: everybody on this network who has the audience's address can watch, and nothing is encrypted; only the "
+    "first address steers, and it works on this machine alone"
+)
+
+
+@contextmanager
+def _audience(player: Player, at: ServedOptions) -> Iterator[list[str]]:
+    """Serve pages that only watch on the network if --share is given; yield the lines with their address."""
+    if not at.share:
+        yield []
+        return
+    from palpate.live.server import PageServer
+
+    say(WARNING)
+    with PageServer(player, at.port, network_address(), steers=False) as address:
+        yield [f"audience, only watches: {address}", *qr_code(str(address)).splitlines()]
+
+
+_ANYWHERE = ("192.0.2.1", 9)
+"""An address reserved for documentation (RFC 5737): asking for the route to it sends nothing."""
+
+
+def network_address() -> str:
+    """This machine's own address on its network.
+
+    Raises:
+        InputError: it is on none.
+    """
+    import socket
+
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(_ANYWHERE)
+            address = str(probe.getsockname()[0])
+        except OSError:
+            address = ""
+    if not address or address.startswith("127.") or address == "0.0.0.0":  # noqa: S104 - compared, not listened on
+        raise InputError("--share: this machine is on no network; connect it, or leave --share out")
+    return address
+
+
+def qr_code(text: str) -> str:
+    """A text as a QR code of half-height blocks, for a terminal."""
+    from io import StringIO
+
+    import segno
+
+    picture = StringIO()
+    segno.make(text, error="l").terminal(picture, compact=True)
+    return picture.getvalue()

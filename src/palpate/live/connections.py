@@ -1,11 +1,13 @@
-"""Connections whose stream has not begun, so that idle ones take no place from a page and do not delay the end.
+"""Limits of a server's connections, so that idle or hostile ones take no place from a page.
 
-A connection waits while it sends its request, and while it receives the page. If too many wait, the oldest is dropped.
+A connection waits until its stream begins: while it sends its request, and while it receives the page. If too many
+wait, the oldest is dropped for a new one. The number of connections from one address is limited, streams included.
 """
 
 from __future__ import annotations
 
 import asyncio
+from collections import Counter
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -14,48 +16,76 @@ MAX_WAITING = 64
 """Number of connections that may wait; the descriptors of a process are few, 256 on some systems."""
 
 
-class WaitingConnections:
-    """Waiting connections of one server; only the thread of its event loop uses them."""
+class ConnectionLimits:
+    """Connections of one server; only the thread of its event loop uses them.
 
-    def __init__(self) -> None:
-        self._transports: dict[asyncio.BaseTransport, None] = {}
+    Args:
+        per_address: maximum from one address; None for any number.
+    """
 
-    def add(self, transport: asyncio.Transport) -> None:
-        """Let a connection wait, and drop the oldest if too many wait."""
-        self._transports[transport] = None
-        if len(self._transports) > MAX_WAITING:
-            oldest: Any = next(iter(self._transports))
-            self.remove(oldest)
+    def __init__(self, per_address: int | None):
+        self._per_address = per_address
+        self._count: Counter[str] = Counter()
+        self._waiting: dict[asyncio.Transport, None] = {}
+
+    def admit(self, transport: asyncio.Transport) -> bool:
+        """Let a connection wait, and drop the oldest if too many wait; False if its address has too many."""
+        address = _address_of(transport)
+        if self._per_address is not None and self._count[address] >= self._per_address:
+            return False
+        self._count[address] += 1
+        self._waiting[transport] = None
+        if len(self._waiting) > MAX_WAITING:
+            oldest = next(iter(self._waiting))
+            del self._waiting[oldest]
             oldest.abort()
+        return True
 
-    def remove(self, transport: asyncio.BaseTransport) -> None:
-        """Forget a connection: its stream has begun, or it has ended."""
-        self._transports.pop(transport, None)
+    def begin_stream(self, transport: asyncio.Transport) -> None:
+        """Note that a connection's stream has begun: it waits no longer."""
+        self._waiting.pop(transport, None)
 
-    def drop_all(self) -> None:
-        """End all connections that wait."""
-        waiting: list[Any] = list(self._transports)
-        for transport in waiting:
+    def remove(self, transport: asyncio.Transport) -> None:
+        """Forget an admitted connection that has ended."""
+        address = _address_of(transport)
+        self._waiting.pop(transport, None)
+        self._count[address] -= 1
+        if not self._count[address]:
+            del self._count[address]
+
+    def drop_waiting(self) -> None:
+        """End all connections that wait, so that none delays the end of the server."""
+        for transport in list(self._waiting):
             transport.abort()
 
 
 @cache
-def waiting_connection() -> Callable[..., Any]:
-    """Class of a server's connections; its first argument is a `WaitingConnections`."""
+def limited_connection() -> Callable[..., Any]:
+    """Class of a server's connections; its first argument is a `ConnectionLimits`."""
     from websockets.asyncio.server import ServerConnection
 
-    class WaitingConnection(ServerConnection):
-        def __init__(self, waiting: WaitingConnections, *words: Any, **options: Any):
+    class LimitedConnection(ServerConnection):
+        def __init__(self, limits: ConnectionLimits, *words: Any, **options: Any):
             super().__init__(*words, **options)
-            self._waiting = waiting
+            self._limits, self._admitted = limits, False
 
         def connection_made(self, transport: asyncio.BaseTransport) -> None:
             assert isinstance(transport, asyncio.Transport)
-            self._waiting.add(transport)
-            super().connection_made(transport)
+            self._admitted = self._limits.admit(transport)
+            if self._admitted:
+                super().connection_made(transport)
+            else:
+                transport.abort()
 
         def connection_lost(self, exc: Exception | None) -> None:
-            self._waiting.remove(self.transport)
-            super().connection_lost(exc)
+            if self._admitted:
+                self._limits.remove(self.transport)
+                super().connection_lost(exc)
 
-    return WaitingConnection
+    return LimitedConnection
+
+
+def _address_of(transport: asyncio.Transport) -> str:
+    """Address of the other end; empty if the connection has ended."""
+    peer = transport.get_extra_info("peername")
+    return str(peer[0]) if peer else ""

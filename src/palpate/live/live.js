@@ -151,6 +151,7 @@
       const message = JSON.parse(data);
       if (message.kind === "clear") { forget(); fresh = true; }
       else if (message.kind === "state") { live.state = message; showState(); }
+      else if (message.kind === "watching") document.body.classList.add("watching");
       else if (message.kind === "refused" && live.state) { live.state.refusal = message.why; showState(); }
     });
     socket.addEventListener("close", () => {

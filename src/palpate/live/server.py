@@ -1,4 +1,4 @@
-"""The server of the page, by a secret address, for this machine alone."""
+"""The server of the page, by a secret address: one that steers, for this machine alone, and one that only watches."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from palpate.errors import InputError
-from palpate.live.connections import WaitingConnections, waiting_connection
+from palpate.live.connections import ConnectionLimits, limited_connection
 from palpate.live.player import Player, Request, page_response
 
 if TYPE_CHECKING:
@@ -26,8 +26,10 @@ if TYPE_CHECKING:
     from websockets.http11 import Response
 
 HOST = "127.0.0.1"
-READERS = 16
-"""Maximum number of pages."""
+READERS, AUDIENCE = 16, 100
+"""Maximum number of pages: that steer, and that watch a lecture."""
+PER_ADDRESS = 6
+"""Connections from one address of an audience: the pages of one telephone, reloaded."""
 REQUEST_TIMEOUT = 5.0
 """How long a request and its answer may take [s]; an idle connection is dropped after it."""
 ALIVE_TIMEOUT = 10.0
@@ -35,7 +37,6 @@ ALIVE_TIMEOUT = 10.0
 _MAX_MESSAGE = 4096
 """Maximum size of a message from a page [bytes]."""
 _OWN_HOST = re.compile(r"(127\.0\.0\.1|localhost|\[::1\])(:\d{1,5})?\Z")
-"""Names of this server, which no other page can have resolved to this machine."""
 _START_TIMEOUT = 30.0
 """Time within which the server listens [s]."""
 _LOG = logging.getLogger("palpate.live")
@@ -49,13 +50,15 @@ class Address:
     Args:
         port: number.
         token: secret part; requests without it are refused.
+        host: address of this machine.
     """
 
     port: int
     token: str
+    host: str = HOST
 
     def __str__(self) -> str:
-        return f"http://{HOST}:{self.port}/{self.token}/"
+        return f"http://{self.host}:{self.port}/{self.token}/"
 
 
 class PageServer:
@@ -66,16 +69,19 @@ class PageServer:
     Args:
         player: source of the rows.
         port: to listen on; 0 takes a free one.
+        host: address of this machine to listen on.
+        steers: True if its pages may steer the player, False if they only watch.
 
     Raises:
         InputError: the port is in use, or may not be taken.
     """
 
-    def __init__(self, player: Player, port: int = 0):
+    def __init__(self, player: Player, port: int = 0, host: str = HOST, *, steers: bool = True):
         if not 0 <= port <= 65535:
             raise InputError(f"--port must be from 0 to 65535, got {port}")
-        self._player, self._port = player, port
-        self._waiting = WaitingConnections()
+        self._player, self._port, self._host, self._steers = player, port, host, steers
+        self._max_readers = READERS if steers else AUDIENCE
+        self._limits = ConnectionLimits(None if steers else PER_ADDRESS)
         self._token = secrets.token_urlsafe(18)
         self._ready = threading.Event()
         self._refused: OSError | None = None
@@ -112,7 +118,7 @@ class PageServer:
             raise InputError(
                 f"port {self._port} {why}; name another with --port; 0 takes a free one"
             ) from None
-        return Address(self._port, self._token)
+        return Address(self._port, self._token, self._host)
 
     async def _serve(self) -> None:
         from websockets.asyncio.server import serve
@@ -120,7 +126,7 @@ class PageServer:
         self._loop, self._end = asyncio.get_running_loop(), asyncio.Event()
         options: dict[str, Any] = {
             "process_request": self._refuse_or_answer,
-            "create_connection": partial(waiting_connection(), self._waiting),
+            "create_connection": partial(limited_connection(), self._limits),
             "compression": None,
             "max_size": _MAX_MESSAGE,
             "open_timeout": REQUEST_TIMEOUT,
@@ -132,7 +138,9 @@ class PageServer:
         }
         async with AsyncExitStack() as stack:
             try:
-                server = await stack.enter_async_context(serve(self._reader, HOST, self._port, **options))
+                server = await stack.enter_async_context(
+                    serve(self._reader, self._host, self._port, **options)
+                )
             except OSError as error:
                 self._refused = error
                 self._ready.set()
@@ -144,7 +152,7 @@ class PageServer:
                 await self._end.wait()
             finally:
                 unlisten()
-                self._waiting.drop_all()
+                self._limits.drop_waiting()
 
     def _notify(self) -> None:
         """Wake all readers; called by the player's thread."""
@@ -161,7 +169,7 @@ class PageServer:
         if request.method != "GET":
             return _refuse_method(connection, request.method)
         hosts = request.headers.get_all("Host")
-        if len(hosts) != 1 or not _OWN_HOST.match(hosts[0]):
+        if len(hosts) != 1 or not self._is_own(hosts[0]):
             return connection.respond(HTTPStatus.FORBIDDEN, "this page is for this machine only\n")
         token, _, rest = request.path.removeprefix("/").partition("/")
         if not secrets.compare_digest(token.encode(), self._token.encode()):
@@ -173,9 +181,15 @@ class PageServer:
             return self._answer(connection, rest)
         if not set(request.headers.get_all("Origin")) <= {f"http://{hosts[0]}"}:
             return connection.respond(HTTPStatus.FORBIDDEN, "other pages may not read this\n")
-        if len(self._readers) >= READERS:
-            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, f"{READERS} pages are open already\n")
+        if len(self._readers) >= self._max_readers:
+            return connection.respond(
+                HTTPStatus.SERVICE_UNAVAILABLE, f"{self._max_readers} pages are open already\n"
+            )
         return None
+
+    def _is_own(self, host: str) -> bool:
+        """True for a name of this server, which no other page can have resolved to this machine."""
+        return bool(self._host == HOST and _OWN_HOST.match(host)) or host == f"{self._host}:{self._port}"
 
     def _answer(self, connection: ServerConnection, rest: str) -> Response:
         """The page, or the refusal of any other path behind the token."""
@@ -192,7 +206,7 @@ class PageServer:
         from websockets.exceptions import ConnectionClosed
 
         news = asyncio.Event()
-        self._waiting.remove(connection.transport)
+        self._limits.begin_stream(connection.transport)
         self._readers.add(news)
         self._player.watch()
         sending = asyncio.create_task(self._send_or_drop(connection, news))
@@ -207,7 +221,7 @@ class PageServer:
 
     async def _answer_request(self, connection: ServerConnection, message: str | bytes) -> None:
         """Obey a page's message, or send the reason why not."""
-        refusal = self._request(message)
+        refusal = self._request(message) if self._steers else "this page only watches"
         if refusal:
             await connection.send(_text("refused", why=refusal))
 
@@ -234,6 +248,8 @@ class PageServer:
                 await connection.send(message)
 
         feed, epoch, count, version = self._player.feed, -1, 0, -1
+        if not self._steers:
+            await send(_text("watching"))
         while True:
             news.clear()
             before = epoch
