@@ -4,6 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from bench.quick import scaled
 from palpate._vector import Vec3
 from palpate.bench import Bench, build, load
 from palpate.bench.tables import Experiment
@@ -22,7 +23,7 @@ def pressed(controller, press=8.0, seed=1, friction=1.0, **tables):
     bench = build(msgspec.convert(tables, Experiment))
     plant = bench.loop.plant
     bench = Bench(
-        bench.loop._replace(plant=plant._replace(friction=plant.friction.scaled_by(friction))), bench.q
+        bench.loop._replace(plant=plant._replace(friction=scaled(plant.friction, friction))), bench.q
     )
     record = bench.run(60.0, seed, press=press)
     first = int(np.argmax(record.columns["phase"] == 1))
