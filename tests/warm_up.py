@@ -18,13 +18,6 @@ def bench() -> None:
     build(load("foam-hybrid")).run(0.01)
 
 
-def one_direction() -> None:
-    """A press in one direction, compiled together with its surface."""
-    from palpate.bench.from_experiment import build_any, load_any
-
-    build_any(load_any("fr3-touch")).run(0.1, 0)
-
-
 def serial_arm() -> None:
     """A press with a serial arm, on palpate's own physics and on MuJoCo's."""
     from palpate.press.prepare import PressSpec, prepare_press, surface_of
@@ -51,7 +44,7 @@ def slide() -> None:
     SlidingLoop(gains).update([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
 
 
-WORK: tuple[tuple[Callable[[], None], ...], ...] = ((bench, one_direction), (serial_arm, slide))
+WORK: tuple[tuple[Callable[[], None], ...], ...] = ((bench,), (serial_arm, slide))
 """For each process, what it runs; as long as the other's."""
 
 

@@ -17,7 +17,7 @@ import numba
 import numpy as np
 
 from palpate._vector import ZERO3
-from palpate.environments.kelvin_voigt import KelvinVoigt
+from palpate.environments.models import KelvinVoigt
 from palpate.environments.surface import UNTOUCHED, touch
 from palpate.press.cell import Reading, TouchState, compiled_tick
 from palpate.press.engines import loop_of

@@ -23,13 +23,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate._vector import Vec3
 from palpate.bench import build, load, start_at
 from palpate.bench.force_input import COLUMNS
 from palpate.bench.plant import Loop, compiled_march
 from palpate.controllers import alone
 from palpate.environments.surface import alone as alone_surface
-from palpate.studies.analysis.linear_loop import vector
-from palpate.studies.analysis.linear_model import exact
 
 HERE = Path(__file__).parent
 FLAGS = "-O3 -march=native -ffp-contract=off -fno-math-errno -std=c11 -shared -fPIC"
@@ -37,6 +36,8 @@ FLAGS = "-O3 -march=native -ffp-contract=off -fno-math-errno -std=c11 -shared -f
 EXPERIMENT = "foam-neural"
 WIDTH = len(COLUMNS)
 AGREED = 1e-8
+FINE_BITS, FINE_COUNTS = 50, 1e17
+"""Bits of a converter, and counts per turn of an encoder, up to which rounding to steps is exact."""
 TARGET, MOST = 1.2, 1.5
 TICKS = 2000
 
@@ -107,6 +108,27 @@ def seconds(engine: March, noise: Array, out: Array) -> float:
     return time.thread_time() - begun
 
 
+def exact(loop: Loop) -> Loop:
+    """The loop with instruments so fine that rounding does not split two trajectories."""
+    sensor, fine = loop.force.sensor, {"bits": FINE_BITS}
+    return loop._replace(
+        encoder=loop.encoder._replace(counts=Vec3(FINE_COUNTS, FINE_COUNTS, FINE_COUNTS)),
+        force=loop.force._replace(
+            sensor=sensor._replace(converter=sensor.converter._replace(**fine)),
+            converter=loop.force.converter._replace(**fine),
+        ),
+        output=loop.output._replace(full_scale=2.0 * loop.conditioning.arm.limits, **fine),
+    )
+
+
+def numbers_of(tree) -> Array:
+    """The numbers of nested tuples in their order, shape (n,)."""
+    parts = [
+        numbers_of(branch) if isinstance(branch, tuple) else np.ravel(branch).astype(float) for branch in tree
+    ]
+    return np.concatenate(parts) if parts else np.zeros(0)
+
+
 def in_kernel(loop: Loop, q) -> March:
     """The bench's own compiled loop."""
     state, done = start_at(loop, q), 0
@@ -169,7 +191,7 @@ def laid_out(loop: Loop, q) -> tuple[Array, Array]:
         (estimators.thesis, estimators.raw, estimators.matched, front, estimators.centring, estimators.touch),
         (loop.tick, loop.steps, q),
     )
-    return vector(parts), np.ascontiguousarray(neural.network.weights)
+    return numbers_of(parts), np.ascontiguousarray(neural.network.weights)
 
 
 def pointer(array: Array):

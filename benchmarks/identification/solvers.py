@@ -17,8 +17,7 @@ import numpy as np
 
 from palpate.certified_logs import check
 from palpate.certified_logs.check import LINEAR, REQUIRED_DIGITS, SOLVERS, SolverResult, scores
-from palpate.certified_logs.models import FLOATS
-from palpate.certified_logs.problem import CertifiedProblem, motion_and_force, problems
+from palpate.certified_logs.models import FLOATS, CertifiedProblem, motion_and_force, problems
 from palpate.identification.least_squares import solve
 
 

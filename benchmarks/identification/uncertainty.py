@@ -23,8 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.certified_logs.models import FLOATS
-from palpate.certified_logs.problem import CertifiedProblem, motion_and_force, problems
+from palpate.certified_logs.models import FLOATS, CertifiedProblem, motion_and_force, problems
 from palpate.identification import Identification, identify
 from palpate.records import Record
 

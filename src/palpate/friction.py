@@ -75,19 +75,6 @@ class LuGre(NamedTuple):
         """Energy in the bristles [J], joint by joint."""
         return 0.5 * self.sigma0 * z * z
 
-    def scaled_by(self, factor):
-        """The same friction `factor` times as strong, with the same presliding and Stribeck speed."""
-        k = factor
-        return LuGre(
-            k * self.sigma0,
-            k * self.sigma1,
-            k * self.sigma2,
-            k * self.coulomb,
-            k * self.static,
-            self.stribeck,
-            self.asymmetry,
-        )
-
     def validate(self):
         """Itself; an InputError where a value is out of its range."""
         for name in ("coulomb", "static", "stribeck"):

@@ -22,3 +22,9 @@ def quick(name, **tables):
         approach={"hold": 0.05, "first": 0.470, "step": 0.002, "period": 0.1},
     )
     return changed(near, **tables)
+
+
+def scaled(friction, factor):
+    """The same friction of joints so many times as strong."""
+    strengths = ("sigma0", "sigma1", "sigma2", "coulomb", "static")
+    return friction._replace(**{name: factor * getattr(friction, name) for name in strengths})

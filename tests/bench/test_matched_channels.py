@@ -5,7 +5,7 @@ import pytest
 
 from palpate._vector import Mat3, Vec3
 from palpate.bench.estimators import Centring, Matched
-from palpate.identifiers.kernels.least_squares import LeastSquares
+from palpate.identifiers.least_squares import LeastSquares
 from palpate.instruments import force_sensor
 from palpate.signals.filters import butterworth3, delay, state_variable
 

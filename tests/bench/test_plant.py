@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bench.quick import scaled
 from palpate._jit import kernel
 from palpate._vector import Vec3, solve
 from palpate.bench.plant import Plant
@@ -103,7 +104,7 @@ compiled_shake = kernel(shake)
 
 def misfit(surface, dt, depth=4e-3):
     """Normal force less what the surface's law gives in central differences of p; and what half a step does to it."""
-    plant = plant_with(surface, LuGre().scaled_by(0.3))
+    plant = plant_with(surface, scaled(LuGre(), 0.3))
     state = pressed(plant, depth)
     static = surface.force(state.surface, depth, 0.0)
     out = np.empty((round(0.2 / dt), 3))
@@ -141,7 +142,7 @@ def kinetic(plant, state):
 
 def imbalance(dt, seconds=0.25):
     """Work of the motors over a press from the air, less what became of it, by account [J]."""
-    plant = plant_with(friction=LuGre().scaled_by(0.3))
+    plant = plant_with(friction=scaled(LuGre(), 0.3))
     state = at_rest(plant, WALL - 2e-3)
     torque = push(plant, (40.0, 4.0, 0.0), state.q)
     end, out = after(plant, state, torque, dt, seconds)

@@ -5,10 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from palpate.benchmark.entry import ForceEntry, load_entry
-from palpate.benchmark.metrics import bandwidth, response, run_metrics, step, touch
-from palpate.benchmark.plan import LINES, PERIOD, ForcePlan
-from palpate.benchmark.simulated import ForceResult, Surfaces, press_surfaces
+from palpate.benchmark.metrics import LINES, PERIOD, ForcePlan, bandwidth, response, run_metrics, step, touch
+from palpate.benchmark.simulated import ForceEntry, ForceResult, Surfaces, load_entry, press_surfaces
 from palpate.benchmark.summary import best_first, sentence
 from palpate.cli import main
 from palpate.errors import InputError

@@ -5,8 +5,7 @@ import pytest
 from certify_references import certify
 
 from palpate.certified_logs.check import REQUIRED_DIGITS, scores
-from palpate.certified_logs.models import FLOATS, MODELS
-from palpate.certified_logs.problem import log_text, motion_and_force, problems
+from palpate.certified_logs.models import FLOATS, MODELS, log_text, motion_and_force, problems
 from palpate.cli import main
 
 KNOWN = problems()

@@ -14,7 +14,7 @@ from palpate.cli._streams import notice_signals
 from palpate.logs import read_record
 from palpate.press import prepare
 from palpate.press.prepare import prepare_press
-from palpate.report.run import page as pages
+from palpate.report.run import figures as pages
 
 PRELUDE = """
 import os, signal, sys, time

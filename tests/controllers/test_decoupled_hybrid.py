@@ -7,8 +7,7 @@ import pytest
 
 from controllers.ideal_arm import press, task
 from palpate._vector import Vec3
-from palpate.controllers.decoupled_hybrid import DecoupledHybrid
-from palpate.controllers.hybrid import Hybrid
+from palpate.controllers.hybrid import DecoupledHybrid, Hybrid
 
 KP, KV = Vec3(400.0, 400.0, 400.0), Vec3(80.0, 80.0, 80.0)
 KF, KFV, K_E = 3000.0, 110.0, 5200.0

@@ -9,26 +9,19 @@ from palpate.controllers import (
     Hybrid,
     Impedance,
     ProportionalIntegral,
-    RaibertCraig,
     ResolvedAcceleration,
-    SelfTuning,
 )
-from palpate.networks import network, random_layers
 from palpate.robots.arm3 import ArmModel
 from palpate.signals.types import Sense, Task
 
-NET = network(list(random_layers((3, 4, 3), 5, 0.5)), (0.25, 5.0, 0.004), 1e-3)
-MIDDLE, SCALE = Vec3(0.25, 5.0, 0.004), Vec3(10.0, 5.0, 100.0)
-#: From the shapes of a task direction's and of a joint's gain to a controller.
+#: From the shape of a task direction's gain to a controller.
 MAKERS = {
-    "hybrid": lambda m, n: Hybrid(m(400.0), m(80.0), m(1.0), m(0.003)),
-    "resolved acceleration": lambda m, n: ResolvedAcceleration(m(400.0), m(80.0)),
-    "proportional-integral": lambda m, n: ProportionalIntegral(m(400.0), m(80.0), m(0.25), m(5.0), 0.001),
-    "raibert-craig": lambda m, n: RaibertCraig(n(50.0), n(10.0), n(3.0), 1.0, 3.0, 0.5, 0.001),
-    "decoupled": lambda m, n: DecoupledHybrid.corrected(m(400.0), m(80.0), m(3000.0), m(110.0), 5200.0),
-    "decoupled, printed": lambda m, n: DecoupledHybrid.printed(m(400.0), m(80.0), m(3000.0), 5200.0),
-    "impedance": lambda m, n: Impedance(m(5.0), m(600.0), m(2000.0), m(0.47)),
-    "self-tuning": lambda m, n: SelfTuning(m(400.0), m(80.0), MIDDLE, SCALE, 0.5, 0.01, 0.001, NET),
+    "hybrid": lambda m: Hybrid(m(400.0), m(80.0), m(1.0), m(0.003)),
+    "resolved acceleration": lambda m: ResolvedAcceleration(m(400.0), m(80.0)),
+    "proportional-integral": lambda m: ProportionalIntegral(m(400.0), m(80.0), m(0.25), m(5.0), 0.001),
+    "decoupled": lambda m: DecoupledHybrid.corrected(m(400.0), m(80.0), m(3000.0), m(110.0), 5200.0),
+    "decoupled, printed": lambda m: DecoupledHybrid.printed(m(400.0), m(80.0), m(3000.0), 5200.0),
+    "impedance": lambda m: Impedance(m(5.0), m(600.0), m(2000.0), m(0.47)),
 }
 each = pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS.keys())
 
@@ -77,8 +70,8 @@ def test_on_arrays_it_means_the_same(make, seed):
     arrays = inputs(3, 3, seed)
     values = [by_value(v) for v in arrays]
     plain = np.empty((5, 3))
-    walk(make(alike, alike), *values, plain)
-    on_arrays = walk_on_arrays(make(lambda v: np.full(3, v), lambda v: np.full(3, v)), *arrays)
+    walk(make(alike), *values, plain)
+    on_arrays = walk_on_arrays(make(lambda v: np.full(3, v)), *arrays)
     assert on_arrays == pytest.approx(plain, rel=1e-9)
 
 
@@ -86,9 +79,7 @@ def test_on_arrays_it_means_the_same(make, seed):
 def test_seven_joints_accelerate_as_the_six_directions_were_told(name):
     """These compensate all of the dynamics: what is left is J qdd + Jdot qd = u."""
     sense, task, model = inputs(6, 7, 6)
-    (torque,) = walk_on_arrays(
-        MAKERS[name](lambda v: np.full(6, v), lambda v: np.full(7, v)), sense, task, model, 1
-    )
+    (torque,) = walk_on_arrays(MAKERS[name](lambda v: np.full(6, v)), sense, task, model, 1)
     outside = 0.0 if name == "resolved acceleration" else sense.f
     qdd = np.linalg.solve(model.M, torque - model.h - model.J.T @ (outside + np.zeros(6)))
     xdd = model.J @ qdd + model.Jdqd

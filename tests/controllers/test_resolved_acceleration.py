@@ -9,7 +9,7 @@ from scipy.signal import StateSpace, lsim
 from controllers.ideal_arm import ARM, START, press, task
 from palpate._vector import ZERO3, Vec3, solve
 from palpate.controllers import ResolvedAcceleration
-from palpate.controllers.resolved_acceleration import resolved_acceleration
+from palpate.controllers.hybrid import resolved_acceleration
 
 angles = st.floats(-3.0, 3.0)
 joints = st.builds(Vec3, angles, angles, angles)

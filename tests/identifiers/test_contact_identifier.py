@@ -11,7 +11,7 @@ from scipy.signal import butter, lfilter
 from palpate.errors import InputError
 from palpate.identifiers import ContactIdentifier
 from palpate.identifiers.contact_identifier import NAMES
-from palpate.identifiers.kernels.contact_stream import UNSET, sampled_at
+from palpate.identifiers.contact_stream import UNSET, sampled_at
 from palpate.signals.low_pass import LowPass, read, taps
 
 RATE = 1000.0

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palpate._vector import outer, solve
-from palpate.identifiers.kernels.dimension import AnyNumber, Four, Three, eliminate
+from palpate.identifiers.dimension import AnyNumber, Four, Three, eliminate
 
 KINDS = [Three(), Four(), AnyNumber(3), AnyNumber(4), AnyNumber(6)]
 kinds = pytest.mark.parametrize("size", KINDS, ids=str)

@@ -7,7 +7,7 @@ from palpate._vector import Mat3, Vec3
 from palpate.errors import InputError
 from palpate.identifiers import RecursiveLeastSquares
 from palpate.identifiers.estimator import Exponential, SIFt
-from palpate.identifiers.kernels.least_squares import LeastSquares, learn_sample, unsure
+from palpate.identifiers.least_squares import LeastSquares, learn_sample, unsure
 
 SIZES = [3, 4, 5]  # three and four parameters go by value, other numbers by array
 

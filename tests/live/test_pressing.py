@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from palpate.environments.kelvin_voigt import KelvinVoigt
+from palpate.environments.models import KelvinVoigt
 from palpate.errors import InputError
 from palpate.live.pressing import DAMPING, FORCE, STIFFNESS, PressingArm
 from palpate.live.view import AT

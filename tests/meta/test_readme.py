@@ -86,10 +86,7 @@ def test_python_of_the_readme_runs(root, tmp_path, monkeypatch):
         exec(compile(code, "README.md", "exec"), {})
 
 
-LONG = {
-    f"docs/{name}.md"
-    for name in ("arms", "force", "analysis", "online", "logs", "moving", "identify", "excite")
-}
+LONG = {f"docs/{name}.md" for name in ("arms", "force", "online", "logs", "moving", "identify", "excite")}
 """They identify, press, tune or prove for seconds."""
 
 

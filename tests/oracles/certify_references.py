@@ -14,8 +14,14 @@ import msgspec
 import numpy as np
 from mpmath import mp  # type: ignore[import-untyped]
 
-from palpate.certified_logs.models import Functions, SineMotion
-from palpate.certified_logs.problem import Certified, CertifiedProblem, motion_and_force, problems
+from palpate.certified_logs.models import (
+    Certified,
+    CertifiedProblem,
+    Functions,
+    SineMotion,
+    motion_and_force,
+    problems,
+)
 
 mp.dps = 60
 AGREE = mp.mpf(10) ** -20

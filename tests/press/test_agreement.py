@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from palpate.environments.kelvin_voigt import KelvinVoigt
+from palpate.environments.models import KelvinVoigt
 from palpate.force import ForceLoop
 from palpate.press.engines import loop_of, press_gains
 from palpate.press.pressing import press

@@ -6,7 +6,7 @@ import pytest
 from bench.quick import quick
 from palpate.bench import build, summarise
 from palpate.records import Record
-from palpate.report.run.page import write_report
+from palpate.report.run.figures import write_report
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Slides as they are shown: the page and the live page."""
+"""Slides as they are shown: the page, the summary, the sentence."""
 
 from __future__ import annotations
 
@@ -10,16 +10,12 @@ import pytest
 from msgspec.structs import replace
 
 from palpate.cli import main
-from palpate.errors import InputError
 from palpate.force import Gains, load_arm
 from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
 from palpate.force.sliding.paths import directions
-from palpate.live.sliding import SlidingArm
-from palpate.live.view import AT
 from palpate.press.unload import HELD
 from palpate.slide.ground import Ground, ground_of
-from palpate.slide.jointed_arm import jointed_arm
 from palpate.slide.report import sentence, summarise, write_report
 from palpate.slide.world import COLUMNS, SlideRun, simulate
 
@@ -103,43 +99,3 @@ def test_a_line_ends_at_its_length(tmp_path, monkeypatch) -> None:
     assert main(["slide", "--gains", "gains.toml", *words, "--out", "out"]) == 0
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert 0.03 < summary["path_m"] < 0.0361  # it starts slowly
-
-
-def test_a_watched_slide_shows_what_it_does_and_takes_sliders() -> None:
-    pytest.importorskip("mujoco", reason="the extra `arms` is not installed")
-    arm, gains = jointed_arm("fr3"), tuned("fr3")
-    gains = replace(gains, arm=arm.inner)
-    watched = SlidingArm(arm, gains, ground_of("bowl", 0.15, 2e4, friction=0.3), 0.03, (0.0, 0.0, -1.0))
-    rows = watched.advance(0.2)
-    assert len(rows) == 40
-    assert "touches" not in watched.view.about
-    touching = replace(gains, slide=Slide(speed=0.03, mu_max=0.9, touches=0.01))
-    watching = SlidingArm(arm, touching, ground_of("plane", 0.2, 2e4), 0.03, (0.0, 0.0, -1.0))
-    assert "three touches for the normal, then the law" in watching.view.about
-    watching.advance(0.2)
-    assert (watching.state.stage, watched.state.stage) == ("touching, 1 of 3", "")
-    assert np.diff(rows[:, AT["t"]]) == pytest.approx(0.005)
-    assert np.isfinite(rows[:, AT["q1"] : AT["q7"] + 1]).all()
-    watched.set("friction", 0.5)
-    watched.set("force", 10.0)
-    row = watched.advance(0.01)[-1]
-    assert (row[AT["B_true"]], row[AT["K_true"]]) == (0.5, 2e4)
-    for wrong in (("friction", 2.0), ("gain", 1.0)):
-        with pytest.raises(InputError):
-            watched.set(*wrong)
-    watched.reset(3)
-    assert watched.advance(0.01)[0, AT["t"]] < 0.01
-
-
-@pytest.mark.long
-def test_a_watched_slide_holds_the_force_around_its_circle() -> None:
-    pytest.importorskip("mujoco", reason="the extra `arms` is not installed")
-    arm, gains = jointed_arm("fr3"), tuned("fr3")
-    watched = SlidingArm(
-        arm, replace(gains, arm=arm.inner), ground_of("bowl", 0.15, 2e4, friction=0.3), 0.03, (0.0, 0.0, -1.0)
-    )
-    rows = watched.advance(5.0)
-    last = rows[-200:]
-    assert last[:, AT["force"]] == pytest.approx(15.0, rel=0.03)
-    assert (np.abs(last[:, AT["B"]] - 0.3) < last[:, AT["B_half"]]).mean() > 0.9
-    assert any(one.text == "slides" for one in watched.state.events)

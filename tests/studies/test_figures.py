@@ -4,12 +4,10 @@ import matplotlib.pyplot
 import numpy as np
 import pytest
 
-from palpate.bench import load
 from palpate.studies.comparison import rankings
 from palpate.studies.figures import (
     cells,
     draw,
-    equivalent,
     figures,
     lines_of,
     panels_of,
@@ -80,14 +78,14 @@ def test_every_figure_that_is_asked_for_is_drawn_and_none_is_left_open(plan, tmp
 def test_a_cell_is_the_median_of_its_runs_and_crossed_where_most_failed(plan):
     asked = plan.study.maps[0]
     x, y = scale_of(plan.axis(asked.x)), scale_of(plan.axis(asked.y))
-    (_, _, foam), (title, value, rubber) = panels_of(results(plan, lost), plan, asked.panels)
+    (_, foam), (title, rubber) = panels_of(results(plan, lost), plan, asked.panels)
     values, failed = cells(foam, asked, METRICS[asked.metric], x, y)
     np.testing.assert_array_equal(values, [[2.0, 11.0, 100.0]] * 2)
     np.testing.assert_array_equal(failed, [[False, False, True]] * 2)
     values, failed = cells(rubber, asked, METRICS[asked.metric], x, y)
     np.testing.assert_array_equal(values, [[1002.0, 1011.0, 1101.0]] * 2)
     assert not failed.any()
-    assert (title, value) == ("world: rubber", "rubber")
+    assert title == "world: rubber"
     assert x.label == "K_i [1/s]"
 
 
@@ -99,7 +97,7 @@ def test_words_are_what_most_runs_came_to(plan):
 
 def test_lines_have_median_and_range_and_stop_where_a_run_failed(plan):
     asked, x = plan.study.curves[0], scale_of(plan.axis("controller.ki"))
-    _, _, rows = panels_of(results(plan, lost), plan, asked.panels)[0]
+    _, rows = panels_of(results(plan, lost), plan, asked.panels)[0]
     drawn = list(lines_of(rows, plan, asked, x))
     assert [line.label for line in drawn] == ["surface.damping: 60", "surface.damping: 200"]
     np.testing.assert_array_equal(drawn[0].middle, [2.0, 11.0, np.nan])
@@ -161,12 +159,3 @@ def test_the_table_has_the_best_settings_for_each_surface(plan):
         ("rubber", value) for value in ("1", "1", "10", "10", "100", "100")
     ]
     assert [ranking.failed for ranking in ranked] == [2, 0]
-
-
-def test_the_equivalent_of_the_neural_controller_is_its_integrator():
-    neural = load("foam-neural")
-    plain = equivalent(neural)
-    assert plain.controller.ki == pytest.approx(5.0)  # eta (A/2)²/Ts = 5e-5 * 100 / 1 ms
-    assert plain.controller.kf == neural.controller.kf
-    assert plain.surface == neural.surface
-    assert equivalent(plain) == plain

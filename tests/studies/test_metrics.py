@@ -149,4 +149,3 @@ def test_a_ring_that_the_rms_passes_is_an_outcome_of_its_own():
     """1.7 N at 40 Hz about 20 N: an RMS of 1.2 N, less than what follows may have."""
     one = record(20.0 + 1.7 * np.sin(2 * np.pi * 40.0 * np.arange(5000) * TICK))
     assert METRICS["outcome"].words[int(of("outcome", one))] == "rings"
-    assert of("settles", one) == 0.0

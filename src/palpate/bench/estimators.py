@@ -16,7 +16,7 @@ from palpate._vector import Vec3
 from palpate.arrays import Array
 from palpate.bench.summary import CONTACT
 from palpate.errors import PartError
-from palpate.identifiers.kernels.least_squares import LeastSquares, LeastSquaresState
+from palpate.identifiers.least_squares import LeastSquares, LeastSquaresState
 from palpate.plugins import reason
 from palpate.records import Record
 from palpate.signals.filters import Biquad, BiquadState, Delay, History, StateVariable, StateVariableState

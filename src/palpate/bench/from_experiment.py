@@ -8,7 +8,7 @@ The user's parts are tried before the first run: an error is reported once, not 
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Any, TypeAlias
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -18,17 +18,14 @@ from palpate.arrays import Array
 from palpate.bench.bench import Bench
 from palpate.bench.estimators import Centring, Estimators, Matched
 from palpate.bench.force_input import COLUMNS, Conditioning, ForceInput, Sequence, force_input
-from palpate.bench.one_direction import OneDirection, OneDirectionBench, build_one_direction
 from palpate.bench.plant import RIGID, Loop, Plant, elastic_mode, start_at, tick
 from palpate.bench.simulation import diagnose, is_own, not_finite
-from palpate.bench.tables import Experiment, convert, parse
-from palpate.bench.toml_parts import TomlFiles
+from palpate.bench.tables import Experiment
 from palpate.controllers import ResolvedAcceleration, controller_of
 from palpate.environments import StickSlip, surface_of
 from palpate.errors import InputError, PartError
-from palpate.files import read_toml
 from palpate.friction import Coulomb, LuGre
-from palpate.identifiers.kernels.least_squares import LeastSquares
+from palpate.identifiers.least_squares import LeastSquares
 from palpate.instruments import Converter, Encoder
 from palpate.references import NO_WAVE, Approach, Chirp, ForceSchedule, Multisine
 from palpate.robots.arm3 import MOTOR_TORQUE, Arm3
@@ -244,52 +241,20 @@ def _truth(loop: Loop) -> dict[str, dict[str, object]]:
     return {name: {"value": value, "unit": unit} for name, (value, unit) in surface.truth().items()}
 
 
-AnyExperiment: TypeAlias = Experiment | OneDirection
-ARM = "arm"
-"""The key that says that a file is of one direction: which arm presses."""
-FILES = TomlFiles("experiment", "an", "palpate.bench", ("experiments", "presses"))
-
-
-def load_any(name: str) -> AnyExperiment:
-    """An experiment by its name, or from a TOML file.
-
-    Raises:
-        InputError: no such experiment or file, TOML that does not parse, an unknown key, a value out of range.
-    """
-    return parse_any(FILES.source(name), name)
-
-
-def parse_any(text: str, where: str) -> AnyExperiment:
-    """An experiment from TOML; `where` names the text in errors."""
-    tables = read_toml(text, where)
-    return convert(tables, where, OneDirection) if ARM in tables else parse(text, where)
-
-
-def build_any(experiment: AnyExperiment) -> Bench | OneDirectionBench:
-    """The bench of an experiment.
-
-    Raises:
-        InputError: numbers that do not go together.
-    """
-    return build_one_direction(experiment) if isinstance(experiment, OneDirection) else build(experiment)
-
-
 TICKS = 3
 """Ticks that are compiled and run."""
 
 
-def check_parts(bench: object, waiting: Callable[[], None] | None = None) -> None:
+def check_parts(bench: Bench, waiting: Callable[[], None] | None = None) -> None:
     """Step each part of the user's once in plain Python, and compile the loop with them.
 
     Args:
-        bench: whose parts; one along one direction has none of the user's.
+        bench: whose parts.
         waiting: called when the loop has to be compiled first.
 
     Raises:
         InputError: a part raises, gives a number that is none, or cannot be compiled; one line says which and where.
     """
-    if not isinstance(bench, Bench):
-        return
     try:
         _check(bench, waiting)
     except PartError as error:

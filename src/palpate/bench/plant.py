@@ -12,7 +12,7 @@ from palpate.bench import force_input
 from palpate.bench.estimators import Estimators, EstimatorsState
 from palpate.bench.force_input import put
 from palpate.bench.summary import CONTACT
-from palpate.controllers.resolved_acceleration import ResolvedAcceleration
+from palpate.controllers.hybrid import ResolvedAcceleration
 from palpate.environments.stick_slip import StickSlip, StickSlipState
 from palpate.environments.surface import Surface, SurfaceState, contact_force, follow, opposing
 from palpate.friction import Coulomb, LuGre

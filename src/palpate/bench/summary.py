@@ -31,8 +31,6 @@ STAY, STAY_FRACTION = 0.5, 0.1
 STEADY = 0.02
 """Steady: a standard deviation of at most this fraction of the desired force."""
 JOINTS = (1, 2, 3)
-JOINED = "saturated1"
-"""A column that only the thesis' arm has, with its pose and its estimators: an arm of one direction has no joints."""
 FRONT_ENDS = ("thesis", "raw", "matched")
 IDENTIFIER = "identifier"
 """Prefix of the columns of an experiment's additional identifier."""
@@ -53,10 +51,7 @@ class Ending:
 
 
 def summarise(record: Record) -> dict[str, Any]:
-    """Plain JSON values: outcome, force, motor limits, estimates, and the truth.
-
-    Of a press along one direction there are neither limits of motors nor estimators that watch.
-    """
+    """Plain JSON values: outcome, force, motor limits, estimates, and the truth."""
     pressing = record["phase"] == CONTACT
     t = record["t"]
     summary: dict[str, Any] = {
@@ -68,16 +63,13 @@ def summarise(record: Record) -> dict[str, Any]:
         "contacts_lost": losses(record),
         "force": None,
         "tip": None,
-        "saturated": {
-            f"joint{i}": _share(record[f"saturated{i}"]) for i in JOINTS if JOINED in record.columns
-        },
+        "saturated": {f"joint{i}": _share(record[f"saturated{i}"]) for i in JOINTS},
         "identified": None,
         "truth": record.meta["truth"],
     }
     if pressing.any():
         last = pressing & (t > t[pressing][-1] - WINDOW)
         summary["force"] = force_figures(record, pressing, last)
-    if pressing.any() and JOINED in record.columns:
         summary["tip"] = {
             "y_error_mm": 1e3 * float(np.mean((record["y"] - record["y_desired"])[last])),
             "phi_error_deg": float(np.degrees(np.mean((record["phi"] - record["phi_desired"])[last]))),

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import msgspec
 from msgspec import Meta
@@ -25,8 +25,6 @@ from palpate.signals.types import (
     example,
     kinds,
 )
-
-T = TypeVar("T")
 
 if TYPE_CHECKING:
     AnyController: TypeAlias = Any  # which fields it has depends on its kind
@@ -219,7 +217,7 @@ class Experiment(Table, kw_only=True):
     """One more that watches, on the channels of the matched estimator; its numbers are columns of the record."""
 
 
-FILES = TomlFiles("experiment", "an", "palpate.bench", ("experiments",))
+FILES = TomlFiles("experiment", "an", "palpate.bench", "experiments")
 names, source = FILES.names, FILES.source
 
 
@@ -236,10 +234,10 @@ def parse(text: str, where: str) -> Experiment:
     """An experiment from TOML; `where` names the text in errors, and parts of the user's lie beside it."""
     if where.endswith(".toml"):
         look_in(Path(where).parent)
-    return convert(read_toml(text, where), where, Experiment)
+    return convert(read_toml(text, where), where)
 
 
-def with_values(experiment: T, changes: Mapping[str, Any]) -> T:
+def with_values(experiment: Experiment, changes: Mapping[str, Any]) -> Experiment:
     """The experiment with other values: {"friction.coulomb": (6.0, 0.5, 0.06), "run.press": 20.0}.
 
     Raises:
@@ -254,11 +252,11 @@ def with_values(experiment: T, changes: Mapping[str, Any]) -> T:
                 table[name] = {}
             table = table[name]
         table[key] = msgspec.to_builtins(value)
-    return convert(tables, ", ".join(changes), type(experiment))
+    return convert(tables, ", ".join(changes))
 
 
-def convert(tables: dict[str, Any], where: str, kind: type[T]) -> T:
-    """The tables as an experiment of this kind; `where` names them in errors.
+def convert(tables: dict[str, Any], where: str) -> Experiment:
+    """The tables as an experiment; `where` names them in errors.
 
     Raises:
         InputError: a key that does not exist, or a value out of range.
@@ -267,12 +265,12 @@ def convert(tables: dict[str, Any], where: str, kind: type[T]) -> T:
     if bad is not None:
         raise InputError(f"{where}: {bad}")
     try:
-        plugin_tables = _own_parts(tables) if kind is Experiment else {}
-        converted: Any = convert_table({**tables, **{key: _STAND_INS[key] for key in plugin_tables}}, kind)
+        plugin_tables = _own_parts(tables)
+        stand_ins = {key: _STAND_INS[key] for key in plugin_tables}
+        converted = convert_table({**tables, **stand_ins}, Experiment)
     except InputError as error:
         raise type(error)(f"{where}: {error}") from error
-    experiment: T = msgspec.structs.replace(converted, **plugin_tables) if plugin_tables else converted
-    return experiment
+    return msgspec.structs.replace(converted, **plugin_tables) if plugin_tables else converted
 
 
 _STAND_INS = {

@@ -149,19 +149,19 @@ def _structs(
 
 @dataclass(frozen=True)
 class TomlFiles:
-    """Files of one kind that come with palpate, and their folders.
+    """Files of one kind that come with palpate, and their folder.
 
     Args:
         kind: word for one file, as `experiment`.
         article: of that word.
         package: that holds the files.
-        folders: in that package.
+        folder: in that package.
     """
 
     kind: str
     article: str
     package: str
-    folders: tuple[str, ...]
+    folder: str
 
     def names(self) -> list[str]:
         """Those that come with palpate."""
@@ -169,7 +169,7 @@ class TomlFiles:
 
     def _files(self) -> dict[str, Traversable]:
         """File of each name."""
-        files = [p for f in self.folders for p in (resources.files(self.package) / f).iterdir()]
+        files = (resources.files(self.package) / self.folder).iterdir()
         return {p.name.removesuffix(".toml"): p for p in files if p.name.endswith(".toml")}
 
     def source(self, name: str) -> str:

@@ -7,8 +7,16 @@ from typing import Any
 import numpy as np
 
 from palpate.bench.summary import BAND
-from palpate.benchmark.metrics import MAX_OVERSHOOT, RunMetrics
-from palpate.benchmark.plan import LINES, PERIOD, STEP_HEIGHT, SWAY, SWAY_FORCE, ForcePlan
+from palpate.benchmark.metrics import (
+    LINES,
+    MAX_OVERSHOOT,
+    PERIOD,
+    STEP_HEIGHT,
+    SWAY,
+    SWAY_FORCE,
+    ForcePlan,
+    RunMetrics,
+)
 from palpate.benchmark.simulated import ForceResult
 from palpate.units import plain
 

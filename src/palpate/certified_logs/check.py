@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.certified_logs.models import FLOATS, SineMotion
-from palpate.certified_logs.problem import CertifiedProblem, motion_and_force
+from palpate.certified_logs.models import FLOATS, CertifiedProblem, SineMotion, motion_and_force
 from palpate.identification.descent import Descent
 from palpate.identification.least_squares import solve
 from palpate.identification.models import Model, NonlinearParameter

@@ -97,8 +97,7 @@ def benchmark(
 
 
 def _run_entries(files: tuple[Path, ...], options: ForceOptions) -> list[ForceResult]:
-    from palpate.benchmark.entry import CAUTIOUS, ForceEntry, load_entry
-    from palpate.benchmark.simulated import Surfaces, press_surfaces
+    from palpate.benchmark.simulated import CAUTIOUS, ForceEntry, Surfaces, load_entry, press_surfaces
 
     force = options.force.si
     surfaces = Surfaces(*options.stiffness.si, options.surfaces, options.repeats, options.seed)

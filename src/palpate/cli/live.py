@@ -16,7 +16,7 @@ from palpate.errors import InputError, how_to_install
 
 if TYPE_CHECKING:
     from palpate.live.player import Player
-    from palpate.live.source import LiveSource
+    from palpate.live.view import LiveSource
 
 _DEFAULT = "foam-hybrid"
 

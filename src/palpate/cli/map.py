@@ -214,7 +214,7 @@ def press_map(press: AskOptions, simulated: SimulatedOptions, phantom: PhantomOp
     Raises:
         InputError: the phantom, the arm or an option is wrong, or an interruption before a map could be drawn.
     """
-    from palpate.environments.kelvin_voigt import KelvinVoigt
+    from palpate.environments.models import KelvinVoigt
     from palpate.maps import report as page
     from palpate.maps.phantom import load_phantom, palpate_phantom
     from palpate.units import plain

@@ -11,7 +11,7 @@ from palpate.cli.toolkit import console, place, print_answer, print_lines, progr
 
 if TYPE_CHECKING:
     from palpate.certified_logs.check import Score
-    from palpate.certified_logs.problem import CertifiedProblem
+    from palpate.certified_logs.models import CertifiedProblem
 
 
 def references(
@@ -37,7 +37,7 @@ def references(
     Raises:
         InputError: a folder without `export`, or `export` without one.
     """
-    from palpate.certified_logs.problem import problems
+    from palpate.certified_logs.models import problems
     from palpate.errors import InputError
 
     if (out is None) == (action == "export"):

@@ -54,10 +54,10 @@ def run(
         output or common.FolderOptions(),
         figure_options or common.FigureOptions(),
     )
-    from palpate.bench.from_experiment import FILES, load_any, parse_any
+    from palpate.bench.tables import FILES, load, parse
 
     if known.list_:
-        common.print_names(FILES, lambda experiment_name: load_any(experiment_name).title)
+        common.print_names(FILES, lambda experiment_name: load(experiment_name).title)
         return 0
     source = common.read_source(FILES, name, "run", known.print_)
     if name is None or source is None:
@@ -67,7 +67,7 @@ def run(
 
     figure_options.check()
     with (plugins or common.PluginOptions()).consent():
-        experiment = parse_any(source, name)  # before a Ctrl-C is only noted, which a question would wait for
+        experiment = parse(source, name)  # before a Ctrl-C is only noted, which a question would wait for
         with notice_signals() as interrupted:
             ran = _run(
                 _RunRequest(name, source, experiment, seed), folder, output, figure_options, interrupted
@@ -110,18 +110,16 @@ def _run(
     interrupted: Callable[[], bool],
 ) -> _Ran:
     """Run an experiment, and write the folder of results."""
-    from palpate.bench.one_direction import OneDirection
     from palpate.bench.summary import summarise
     from palpate.logs.tables.parquet import write_record
-    from palpate.report.run.page import write_report
+    from palpate.report.run.figures import write_report
 
     with fresh_folder(folder, replace=output.replace) as fresh:
         command = printable(f"palpate run {shlex.quote(request.name)} --seed {request.seed}")
         record = _record(console(stderr=output.json), request, interrupted)
         record = replace(record, meta={**record.meta, "command": command})
         write_record(record, fresh / RECORD)
-        alone = isinstance(request.experiment, OneDirection)  # nothing excites it, and no estimator watches
-        identification, reason = (None, "") if alone else _identify(fresh / RECORD)
+        identification, reason = _identify(fresh / RECORD)
         outcome = {
             "identification": identification.to_json() if identification is not None else None,
             "not_identified": reason,
@@ -160,11 +158,11 @@ def _identify(record: Path) -> tuple[Identification | None, str]:
 
 
 def _record(screen: Console, request: _RunRequest, interrupted: Callable[[], bool]) -> Record:
-    from palpate.bench.from_experiment import build_any, check_parts
+    from palpate.bench.from_experiment import build, check_parts
 
     experiment = request.experiment
     try:
-        bench = build_any(experiment)
+        bench = build(experiment)
         check_parts(bench, lambda: screen.print(COMPILING))
     except InputError as error:
         raise InputError(f"{request.name}: {error}") from error
@@ -176,10 +174,9 @@ def _record(screen: Console, request: _RunRequest, interrupted: Callable[[], boo
 
 
 def _show(ran: _Ran, folder: Path, as_json: bool) -> None:
-    from palpate.report.run.page import tables_of_run
-    from palpate.report.run.table import build_answer
+    from palpate.report.run.table import build_answer, tables
 
-    summary, run_tables = ran.summary, tables_of_run(ran.record, ran.summary, ran.identification)
+    summary, run_tables = ran.summary, tables(ran.summary, ran.identification)
     report = folder / "report.html"
     written = ("report:", report) if report.exists() else ("nothing to draw; the record is in", folder)
     print_result(build_answer(ran.title, summary, run_tables), json=as_json, files=[written])

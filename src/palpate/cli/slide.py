@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from dataclasses import replace as replaced
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -233,7 +232,6 @@ def slide(
     limits: LimitOptions | None = None,
     out: Path | None = None,
     replace: Annotated[bool, FLAG] = False,
-    live: Annotated[bool, FLAG] = False,
     json: Annotated[bool, FLAG] = False,
 ) -> int:
     """Hold a force while the tip moves along an unknown curved surface, in simulation or with a real arm.
@@ -255,8 +253,6 @@ def slide(
         Folder for record.parquet, summary.json, slide.png and report.html; runs/slide-ARM-SEED when left out.
     replace
         Replace the results at --out.
-    live
-        Watch the slide in the browser, around a circle, its joints moved by MuJoCo (extras: arms, live).
     json
         Print one JSON object and nothing else.
     """
@@ -268,12 +264,8 @@ def slide(
         return _slide_over(task, wire, limits, json)
     _check_simulated(task, wire, limits)
     check_dither(task.dither)
-    if live:
-        task = replaced(task, physics="mujoco", path="circle", seconds=1.0)
     tool, gains = task.tool, task.tuned_gains()
     ways, ground = task.directions(gains), task.ground()
-    if live:
-        return _watch(task, gains, ground)
     folder = out or Path("runs") / f"slide-{Path(task.arm).stem}-{task.seed}"
     with notice_signals() as interrupted, fresh_folder(folder, replace=replace) as fresh:
         prepared = task.prepare(gains, ground, ways, tool)
@@ -325,15 +317,6 @@ def _check_simulated(task: SlideOptions, wire: WireOptions, limits: LimitOptions
         only(part, "a real arm, and --wire is missing; add --wire")
     if task.end != "retreat":
         raise InputError("--end is for a real arm, and --wire is missing; add --wire, or leave out --end")
-
-
-def _watch(task: SlideOptions, gains: Gains, ground: Ground) -> int:
-    """Serve the live page of a slide."""
-    from palpate.cli.live import ServedOptions, show_live
-    from palpate.live.sliding import SlidingArm
-
-    arm = SlidingArm(task.joints, gains, ground, task.extent, task.into, task.seed, task.tool)
-    return show_live(arm, ServedOptions())
 
 
 def _slide_over(task: SlideOptions, wire: WireOptions, limits: LimitOptions, json: bool) -> int:

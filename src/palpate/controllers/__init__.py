@@ -13,14 +13,16 @@ from palpate.controllers.controller import (
     controller_of,
     join,
 )
-from palpate.controllers.decoupled_hybrid import DecoupledHybrid, DecoupledHybridController
-from palpate.controllers.hybrid import Hybrid, HybridController
+from palpate.controllers.hybrid import (
+    DecoupledHybrid,
+    DecoupledHybridController,
+    Hybrid,
+    HybridController,
+    ResolvedAcceleration,
+)
 from palpate.controllers.impedance import Impedance, ImpedanceController
 from palpate.controllers.neural import Neural, NeuralController
 from palpate.controllers.proportional_integral import ProportionalIntegral, ProportionalIntegralController
-from palpate.controllers.raibert_craig import RaibertCraig, RaibertCraigController
-from palpate.controllers.resolved_acceleration import ResolvedAcceleration
-from palpate.controllers.self_tuning import SelfTuning, SelfTuningController
 
 __all__ = [
     "AnyController",
@@ -37,11 +39,7 @@ __all__ = [
     "NeuralController",
     "ProportionalIntegral",
     "ProportionalIntegralController",
-    "RaibertCraig",
-    "RaibertCraigController",
     "ResolvedAcceleration",
-    "SelfTuning",
-    "SelfTuningController",
     "alone",
     "cautious_on_bench",
     "controller",

@@ -5,7 +5,7 @@ from typing import ClassVar, NamedTuple
 from palpate._jit import law
 from palpate._vector import Vec3
 from palpate.controllers.controller import ControllerTable, controller
-from palpate.controllers.resolved_acceleration import resolved_acceleration
+from palpate.controllers.hybrid import resolved_acceleration
 from palpate.signals.types import NotNegativeTriple, PositiveTriple, triple
 
 

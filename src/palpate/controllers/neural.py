@@ -9,8 +9,7 @@ from msgspec import Meta
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Vec3
 from palpate.controllers.controller import ControllerTable, controller
-from palpate.controllers.hybrid import hybrid
-from palpate.controllers.resolved_acceleration import position_command
+from palpate.controllers.hybrid import hybrid, position_command
 from palpate.errors import InputError
 from palpate.networks import THESIS_AMPLITUDE, Network, NetworkState, network, random_layers, thesis_layers
 from palpate.signals.types import NotNegative, PositiveTriple, Size, Triple, alike, coerce_fields, triple

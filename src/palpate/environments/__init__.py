@@ -1,8 +1,13 @@
 """Environments: one-sided surfaces along their normal, and friction along them."""
 
-from palpate.environments.hunt_crossley import HuntCrossley, HuntCrossleySurface
-from palpate.environments.kelvin_voigt import KelvinVoigt, KelvinVoigtSurface
-from palpate.environments.standard_linear_solid import StandardLinearSolid, StandardLinearSolidSurface
+from palpate.environments.models import (
+    HuntCrossley,
+    HuntCrossleySurface,
+    KelvinVoigt,
+    KelvinVoigtSurface,
+    StandardLinearSolid,
+    StandardLinearSolidSurface,
+)
 from palpate.environments.stick_slip import StickSlip, StickSlipState
 from palpate.environments.surface import (
     UNTOUCHED,

@@ -14,10 +14,10 @@ from palpate._jit import kernel
 from palpate._jit.typed_edge import cast_array, cast_number, machine_code
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.identifiers.kernels import contact_state, contact_stream, octave_sums
-from palpate.identifiers.kernels.contact_stream import take_tick
-from palpate.identifiers.kernels.octave_sums import LineNoise
+from palpate.identifiers import contact_state, contact_stream, octave_sums
+from palpate.identifiers.contact_stream import take_tick
 from palpate.identifiers.octave_fit import octave_fit
+from palpate.identifiers.octave_sums import LineNoise
 from palpate.identifiers.octave_system import OctaveData
 from palpate.records import Readable
 from palpate.signals.low_pass import FRACTIONS, LowPass, taps

@@ -17,8 +17,8 @@ from palpate._jit.typed_edge import cast_array, cast_number, machine_code
 from palpate._vector import solve
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.identifiers.kernels.dimension import size_of
-from palpate.identifiers.kernels.least_squares import length, stretch, stretch_of
+from palpate.identifiers.dimension import size_of
+from palpate.identifiers.least_squares import length, stretch, stretch_of
 from palpate.records import Readable
 from palpate.signals.types import Estimate, Table, coerce_fields, require
 

@@ -187,11 +187,6 @@ class NeuralProbe(Readable):
         """The weights of each layer, shape (n, n_before + 1), thresholds in column 0; copies."""
         return layers_of(self._net.sizes, self._memory.weights.copy())
 
-    @property
-    def range_learned(self) -> Array:
-        """Smallest and largest displacement, velocity and acceleration seen, shape (2, 3)."""
-        return np.stack([self._low, self._high])
-
     def _warnings(self, values: Array) -> tuple[tuple[str, str], ...]:
         if not np.isfinite(self._low).all():
             return ((OUTSIDE, "nothing has been learned yet: update the network first"),)

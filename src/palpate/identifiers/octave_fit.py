@@ -17,7 +17,7 @@ from statistics import NormalDist
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.identifiers.kernels import octave_sums as sums
+from palpate.identifiers import octave_sums as sums
 from palpate.identifiers.octave_system import (
     CONTACT_SIZE,
     OTHER_FORCES,

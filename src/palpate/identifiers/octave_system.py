@@ -9,8 +9,8 @@ from itertools import product
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.identifiers.kernels import octave_sums as sums
-from palpate.identifiers.kernels.octave_sums import LineNoise
+from palpate.identifiers import octave_sums as sums
+from palpate.identifiers.octave_sums import LineNoise
 from palpate.signals.octaves import MIN_MOTION, OVERLAP, TIED, pool_levels, stretch_shares
 from palpate.signals.position_noise import NOISELESS, PositionNoise
 

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from palpate._jit import law, part
 from palpate.arrays import Array
 from palpate.identifiers import estimator
+from palpate.identifiers.dimension import AnyNumber
 from palpate.identifiers.estimator import NAMES, VAGUE, Exponential, SIFt, is_sample
-from palpate.identifiers.kernels.dimension import AnyNumber
-from palpate.identifiers.kernels.least_squares import (
+from palpate.identifiers.least_squares import (
     covariance_in,
     error_covariance_in,
     known_first,

@@ -24,7 +24,7 @@ from palpate.identifiers.estimator import (
     check_start,
     forgetting_policy,
 )
-from palpate.identifiers.kernels.least_squares import (
+from palpate.identifiers.least_squares import (
     known_first,
     learn_sample,
     length,

@@ -1,1 +1,1 @@
-"""The page in the browser with an arm that presses or slides; it works offline, and steers on this machine alone."""
+"""The page in the browser with an arm that presses; it works offline, and steers on this machine alone."""

@@ -58,7 +58,7 @@
   const figures = [
     { title: "Force", y: "force [N]", series: [measured, force, desired] },
     { title: "Position", y: "depth in the surface [mm]", series: [{ label: "depth in the surface", kind: "own", colour: "F", of: "depth" }] },
-    ...Object.entries(view.quantities).map(([key, [title, unit]], i) => (
+    ...[["K", "Stiffness K", "N/m"], ["B", "Damping B", "N s/m"]].map(([key, title, unit], i) => (
       { title, y: `${title.split(" ").pop()} [${unit}]`, series: estimated(key), wanted: about(key, i ? 0.3 : 0.06) })),
   ];
   const tall = () => (innerWidth > 900 ? Math.max(120, (innerHeight - 150) / figures.length - 44) : 170);
@@ -136,7 +136,7 @@
     const kind = last("phase"), node = byId("phase");
     const [word, tone] = away ? ["gone", "fail"] : live.state && !live.state.playing && !live.state.ended ? ["paused", "none"]
       : live.state && live.state.ended && !live.state.ended.startsWith("done") ? ["stopped", "fail"] : live.state && live.state.ended ? ["ended", "none"]
-      : live.state && live.state.stage ? [live.state.stage, "go"] : kind === 1 ? ["pressing", "ok"] : kind === 2 ? ["contact lost", "fail"] : ["approaching", "go"];
+      : kind === 1 ? ["pressing", "ok"] : kind === 2 ? ["contact lost", "fail"] : ["approaching", "go"];
     if (node.textContent !== word) { node.textContent = word; node.className = `v ${tone}`; }
   };
 

@@ -20,8 +20,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.live.source import LiveSource
-from palpate.live.view import COLUMNS, STRIDE, View
+from palpate.live.view import COLUMNS, STRIDE, LiveSource, View
 from palpate.report.look.assets import ARM, ARM_IN_SPACE, CHARTS, data, policy, scripts
 from palpate.report.page import render
 from palpate.text import printable
@@ -207,7 +206,6 @@ class Player:
             "seed": state.seed,
             "ended": state.ended,
             "warning": state.warning,
-            "stage": state.stage,
             "events": [asdict(event) for event in state.events],
             "refusal": self._refusal,
         }
@@ -234,9 +232,9 @@ class Player:
 
     def _advance(self, seconds: float) -> None:
         state = self.source.state
-        before = state.ended, state.events, state.warning, state.stage
+        before = state.ended, state.events, state.warning
         self.feed.put(self.source.advance(seconds))
-        if (state.ended, state.events, state.warning, state.stage) != before:
+        if (state.ended, state.events, state.warning) != before:
             if state.ended:
                 self._playing = False
             self._publish()

@@ -7,28 +7,43 @@ from msgspec.structs import replace
 
 from palpate.arrays import Array
 from palpate.bench.summary import CONTACT, DIVERGED, LOST
-from palpate.environments.kelvin_voigt import KelvinVoigt
+from palpate.environments.models import KelvinVoigt
+from palpate.errors import InputError
 from palpate.force import ForceLoop
 from palpate.force.gains import Gains
 from palpate.identifiers import ContactIdentifier
-from palpate.live.source import ShownArm
-from palpate.live.view import Event, Slider
+from palpate.live.view import (
+    AT,
+    COLUMNS,
+    LONGEST,
+    MAX_JOINTS,
+    OVER,
+    STRIDE,
+    Event,
+    LiveSource,
+    Scene,
+    Slider,
+    View,
+)
 from palpate.press.engines import series_of
 from palpate.press.prepare import PressSpec, prepare_press
 from palpate.press.pressing import JOINT_LIMIT
 from palpate.press.sequence import CautiousDriver, PressSequence
-from palpate.press.setting import cell_of
+from palpate.press.setting import Place, cell_of
 from palpate.press.simulated_arm import SimulatedArm
+from palpate.robots.serial.serial_arm import SerialArm
 from palpate.signals.types import NORMAL
 from palpate.text import printable
 
 FORCE, STIFFNESS, DAMPING = 20.0, 5000.0, 50.0
 """Initial values of the sliders [N, N/m, N s/m]."""
+_PATCH = 0.12
+"""Half the side of the drawn surface [m]."""
 _ESTIMATES_PER_SECOND = 20.0
 """Rate at which the identifier's estimate is read, in simulated time [Hz]."""
 
 
-class PressingArm(ShownArm):
+class PressingArm(LiveSource):
     """A serial arm that presses as long as somebody watches.
 
     Args:
@@ -45,8 +60,18 @@ class PressingArm(ShownArm):
         prepared = prepare_press(PressSpec(arm=name, force=FORCE, surface=surface, probe=0.0)).request
         gains = prepared.gains
         notes = tuple(printable(note) for note in prepared.notes)
-        law = "the cautious law of palpate tune, own physics"
-        super().__init__(prepared.arm, prepared.place, gains, _sliders(gains), law, seed, notes=notes)
+        arm, place = prepared.arm, prepared.place
+        if arm.joints > MAX_JOINTS:
+            raise InputError(f"{arm.title} has {arm.joints} joints; at most {MAX_JOINTS} are drawn")
+        self._arm, self._place, self._gains = arm, place, gains
+        self._ticks_per_row = max(1, round(STRIDE * gains.arm.rate))
+        about = printable(f"{gains.arm.title}; the cautious law of palpate tune, own physics")
+        view = View(
+            title=printable(arm.title), about=about, rate=float(gains.arm.rate),
+            stride=self._ticks_per_row * gains.arm.tick, sliders=_sliders(gains), rest=tuple(map(float, place.q)),
+            scene=scene_of(arm, place), notes=notes,
+        )  # fmt: skip
+        super().__init__(view, seed)
         if before_compiling is not None:
             before_compiling()
         self._series = series_of(gains.arm)
@@ -55,7 +80,7 @@ class PressingArm(ShownArm):
     def reset(self, seed: int | None = None) -> None:
         """Return to the beginning; the sliders stay."""
         self.state.restart(seed)
-        self._restart_clock()
+        self._count, self._due, self._show_highest = 0, 0.0, True
         loop, cell = self._gains.arm, cell_of(self._arm, self._place, self._surface, self._gains.arm)
         self._simulated = SimulatedArm(self._arm, loop, self._place, cell, "own", self.state.seed)
         self._phase = 0.0
@@ -102,6 +127,37 @@ class PressingArm(ShownArm):
         )
         self._estimate: dict[str, float] = {}
 
+    @property
+    def _now(self) -> float:
+        """Time of the simulation since its start [s]."""
+        return self._count * self._gains.arm.tick
+
+    def advance(self, seconds: float) -> Array:
+        """Rows of the next seconds; the measured force is by turns the highest and the lowest since the last row."""
+        self._due += seconds
+        last_tick = self._due * self._gains.arm.rate + 1e-6
+        rows: list[Array] = []
+        while not self.state.ended and self._count + self._ticks_per_row <= last_tick:
+            readings: list[float] = []
+            while len(readings) < self._ticks_per_row and not self.state.ended:
+                readings.append(self._tick())
+                self._count += 1
+            row = self._row(max(readings) if self._show_highest else min(readings))
+            self._show_highest = not self._show_highest
+            if self._now >= LONGEST:
+                self.state.ended = self.state.ended or OVER
+            if np.isfinite(row[: AT["depth"] + 1]).all():
+                rows.append(row)
+        return np.array(rows).reshape(-1, len(COLUMNS))
+
+    def _row(self, measured: float) -> Array:
+        """Row of the present tick, which a record has at the time before it."""
+        row = np.full(len(COLUMNS), np.nan)
+        columns = {"t": self._now - self._gains.arm.tick, "measured": measured, **self._values()}
+        row[[AT[name] for name in columns]] = list(columns.values())
+        row[AT["q1"] : AT["q1"] + self._arm.joints] = self._simulated.truth.q
+        return row
+
     def _tick(self) -> float:
         """Run one tick; returns the force reading before it [N]."""
         tick, normal = self._sequence.tick(), self._place.normal
@@ -145,9 +201,6 @@ class PressingArm(ShownArm):
             **self._estimate,
         }
 
-    def _joints(self) -> Array:
-        return self._simulated.truth.q
-
     def _warning(self, saturated: Array) -> str:
         if saturated.any():
             joints = " and ".join(self._arm.names[i] for i in np.flatnonzero(saturated))
@@ -182,3 +235,23 @@ def _sliders(gains: Gains) -> tuple[Slider, ...]:
         Slider("surface.stiffness", "surface K", "N/m", STIFFNESS / 20, 20 * STIFFNESS, STIFFNESS, True, "K"),
         Slider("surface.damping", "surface B", "N s/m", DAMPING / 20, 20 * DAMPING, DAMPING, True, "B"),
     )
+
+
+def scene_of(arm: SerialArm, place: Place) -> Scene:
+    """The arm's joints and the surface around the tip, for the page."""
+    chain = arm.chain
+    tip = place.pose[:3, 3]
+    centre = tip + (place.place - place.normal @ tip) * place.normal
+    u, v = _PATCH * place.axes[1], _PATCH * place.axes[2]
+    return Scene(
+        at=_tuples(chain.at),
+        turn=tuple(_tuples(axes) for axes in chain.turn),
+        slide=tuple(bool(slides) for slides in chain.slide),
+        tip=tuple(map(float, chain.tip)),
+        normal=tuple(map(float, place.normal)),
+        patch=_tuples(np.array([centre + u + v, centre + u - v, centre - u - v, centre - u + v])),
+    )
+
+
+def _tuples(rows: Array) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(map(float, row)) for row in rows)

@@ -13,8 +13,7 @@ from palpate.bench.summary import CONTACT, LOST
 from palpate.bench.tables import Experiment, with_values
 from palpate.environments import SurfaceState
 from palpate.environments.surface import rest_for
-from palpate.live.source import LONGEST, OVER, LiveSource
-from palpate.live.view import AT, COLUMNS, STRIDE, Event, Slider, View
+from palpate.live.view import AT, COLUMNS, LONGEST, OVER, STRIDE, Event, LiveSource, Slider, View
 from palpate.signals.types import NORMAL
 from palpate.text import printable
 

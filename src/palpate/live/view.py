@@ -1,8 +1,9 @@
-"""Content of the live page: the description of a simulation, the columns of its rows, and its state."""
+"""Simulations that run as long as somebody watches: what the page draws, the columns of its rows, and their state."""
 
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 
 COLUMNS = (
@@ -35,6 +36,9 @@ MAX_JOINTS = 7
 """Number of joint columns."""
 STRIDE = 0.005
 """Time between two rows that are shown [s]."""
+LONGEST = 3600.0
+"""Simulated time after which a simulation ends [s]."""
+OVER = f"done: an hour of simulated time ({LONGEST:.0f} s) is over; reset to start again"
 MAX_EVENTS = 12
 """Number of most recent events that the charts mark."""
 
@@ -98,7 +102,6 @@ class View:
         scene: a serial arm in space; None for a planar arm.
         rest: joint positions at the start [rad, m].
         notes: sentences for the reader.
-        quantities: title and unit of the estimates K and B; B is the friction of a slide.
     """
 
     title: str
@@ -110,9 +113,6 @@ class View:
     scene: Scene | None = None
     rest: tuple[float, ...] = ()
     notes: tuple[str, ...] = ()
-    quantities: dict[str, tuple[str, str]] = field(
-        default_factory=lambda: {"K": ("Stiffness K", "N/m"), "B": ("Damping B", "N s/m")}
-    )
 
     def to_json(self) -> dict[str, Any]:
         """Plain JSON values for the page."""
@@ -158,7 +158,6 @@ class SourceState:
         ended: reason of the end; empty while the simulation runs.
         events: the most recent events.
         warning: about the running simulation; may be empty.
-        stage: what precedes the press, for the header; may be empty.
     """
 
     values: dict[str, float] = field(default_factory=dict)
@@ -166,7 +165,6 @@ class SourceState:
     ended: str = ""
     events: list[Event] = field(default_factory=list)
     warning: str = ""
-    stage: str = ""
 
     def restart(self, seed: int | None) -> None:
         """Clear everything but the sliders, and take another seed if one is given.
@@ -178,8 +176,57 @@ class SourceState:
             if seed < 0:
                 raise InputError(f"the seed must be 0 or above, got {seed}")
             self.seed = seed
-        self.ended, self.events, self.warning, self.stage = "", [], "", ""
+        self.ended, self.events, self.warning = "", [], ""
 
     def add_event(self, event: Event) -> None:
         """Add an event, and drop the oldest."""
         self.events = [*self.events, event][-MAX_EVENTS:]
+
+
+class LiveSource:
+    """Simulation that the player advances; a subclass has `advance`, `reset` and `_apply`.
+
+    Args:
+        view: description of the simulation.
+        seed: of the noise.
+
+    Raises:
+        InputError: a seed below 0.
+    """
+
+    def __init__(self, view: View, seed: int):
+        self.view, self.state = view, SourceState({slider.key: slider.value for slider in view.sliders})
+        self.state.restart(seed)
+
+    def reset(self, seed: int | None = None) -> None:
+        """Return to the beginning, with another seed if one is given; the sliders stay.
+
+        Raises:
+            InputError: a seed below 0.
+        """
+        raise NotImplementedError
+
+    def advance(self, seconds: float) -> Array:
+        """Rows of the next seconds, shape (n, len(COLUMNS)); none after the end."""
+        raise NotImplementedError
+
+    def set(self, key: str, value: float) -> None:
+        """Move a slider.
+
+        Raises:
+            InputError: an unknown slider, or a value that is out of range or refused.
+        """
+        self.view.check(key, value)
+        before = self.state.values[key]
+        if value == before:
+            return
+        self.state.values[key] = value
+        try:
+            self._apply(key)
+        except InputError:
+            self.state.values[key] = before
+            raise
+
+    def _apply(self, key: str) -> None:
+        """Use the new value of a slider."""
+        raise NotImplementedError

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.environments.kelvin_voigt import KelvinVoigt
+from palpate.environments.models import KelvinVoigt
 from palpate.errors import InputError
 from palpate.files import read_table, read_text
 from palpate.maps.presses import Presses

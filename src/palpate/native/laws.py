@@ -17,8 +17,8 @@ from palpate.force.sliding.slide_law import slide_step
 from palpate.force.sliding.slide_state import put_vector, vector_at
 from palpate.force.sliding.sliding_loop import slide_estimate, sliding
 from palpate.identifiers import RecursiveLeastSquares
-from palpate.identifiers.kernels.dimension import Four, Three
-from palpate.identifiers.kernels.least_squares import error_covariance_in
+from palpate.identifiers.dimension import Four, Three
+from palpate.identifiers.least_squares import error_covariance_in
 from palpate.identifiers.recursive_least_squares import absorb
 from palpate.native.module import Argument, Entry, Module
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.contact_frame.payload import Payload
-from palpate.environments.kelvin_voigt import KelvinVoigt, Layered, stiffest
+from palpate.environments.models import KelvinVoigt, Layered, stiffest
 from palpate.errors import InputError, unknown
 from palpate.force.arm import Sensor
 from palpate.force.ceiling import check_same_force_max, usual_force_max

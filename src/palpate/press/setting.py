@@ -9,7 +9,7 @@ from palpate._vector import Mat3, Vec3
 from palpate.arrays import Array
 from palpate.contact_frame.payload import Payload
 from palpate.contact_frame.tool_payload import weight_sign
-from palpate.environments.kelvin_voigt import KelvinVoigt, Layered, stiffest
+from palpate.environments.models import KelvinVoigt, Layered, stiffest
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, ServoLoop, TorqueLoop
 from palpate.force.gains import padded_vector

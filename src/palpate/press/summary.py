@@ -9,7 +9,7 @@ from palpate.arrays import Array
 from palpate.bench import summary
 from palpate.contact_frame.payload import Payload
 from palpate.contact_frame.press_or_slide import identify_contact
-from palpate.environments.kelvin_voigt import KelvinVoigt, Layered
+from palpate.environments.models import KelvinVoigt, Layered
 from palpate.errors import InputError
 from palpate.force.arm import PositionLoop
 from palpate.force.gains import Gains

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.arrays import Array
-from palpate.environments.kelvin_voigt import KelvinVoigt
+from palpate.environments.models import KelvinVoigt
 from palpate.errors import InputError
 from palpate.force.arm import Arm
 from palpate.force.gains import Gains

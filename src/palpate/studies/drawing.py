@@ -138,20 +138,6 @@ def curves_figure(panels: Sequence[LinePanel], label: str, words: Sequence[str] 
 
 
 @dataclass(frozen=True)
-class BoundaryLine:
-    """A line over a map.
-
-    Args:
-        label: its meaning.
-        x, y: its points, in the places of the map's scales.
-    """
-
-    label: str
-    x: Sequence[float]
-    y: Sequence[float]
-
-
-@dataclass(frozen=True)
 class Heat:
     """A map over two parameters.
 
@@ -160,7 +146,6 @@ class Heat:
         x, y: its axes.
         values: shape (y, x), NaN where there is none; or words.
         failed: shape (y, x), True where most runs were not completed.
-        bounds: lines over it.
     """
 
     title: str
@@ -168,7 +153,6 @@ class Heat:
     y: Scale
     values: Array | NDArray[np.str_]
     failed: Mask
-    bounds: Sequence[BoundaryLine] = ()
 
 
 def heat_figure(panels: Sequence[Heat], label: str) -> Figure:
@@ -186,7 +170,6 @@ def heat_figure(panels: Sequence[Heat], label: str) -> Figure:
                 panel.x.edges(), panel.y.edges(), panel.values, norm=norm, cmap="viridis_r"
             )
         _draw_crosses(panel, axis)
-        _draw_bounds(panel, axis)
         panel.x.dress(axis, "x")
         panel.y.dress(axis, "y")
         axis.set_title(panel.title, loc="left", fontsize=9.5)
@@ -222,14 +205,6 @@ def _draw_crosses(panel: Heat, axis: Axes) -> None:
     for color, width in ((HALO, 2.2), (style.INK, 0.9)):
         look: dict[str, Any] = {"color": color, "markersize": size, "markeredgewidth": width}
         axis.plot(panel.x.places[x], panel.y.places[y], "x", **look)
-
-
-def _draw_bounds(panel: Heat, axis: Axes) -> None:
-    for i, line in enumerate(panel.bounds):
-        axis.plot(line.x, line.y, color=HALO, linewidth=3.4)
-        axis.plot(line.x, line.y, color=style.FAIL, linewidth=1.8, label=line.label if i == 0 else None)
-    if panel.bounds:
-        axis.legend(loc="upper left", **LEGEND)
 
 
 def _draw_key(figure: Figure, panels: Sequence[Heat]) -> None:

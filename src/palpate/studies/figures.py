@@ -1,15 +1,10 @@
-"""The figures of a study, from its rows: maps and curves.
-
-A map shows where the linear model of the study's loop loses its stability, if the study wants it.
-"""
+"""The figures of a study, from its rows: maps and curves."""
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,15 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array, Mask
-from palpate.bench import Experiment, with_values
 from palpate.bench.summary import DONE
-from palpate.controllers import NeuralController
-from palpate.errors import InputError
 from palpate.report import style
-from palpate.studies.analysis import linearise, sign_changes
 from palpate.studies.comparison import short
 from palpate.studies.drawing import (
-    BoundaryLine,
     Heat,
     LinePanel,
     MetricLine,
@@ -51,8 +41,6 @@ LOG_RATIO = 10.0
 """Ratio of the largest to the smallest value of a list from which its axis is logarithmic."""
 ALWAYS = frozenset({"time_in_contact", "contacts_lost"})
 """Metrics of incomplete runs too."""
-BOUND_STEPS = 8
-"""Steps of a map's row between two of which one change of stability is found."""
 
 
 @dataclass(frozen=True)
@@ -128,15 +116,15 @@ def scale_of(axis: Axis) -> Scale:
     return Scale(axis.title, axis.labels(), bool(0.0 < LOG_RATIO * low <= high))
 
 
-def panels_of(frame: DataFrame, plan: RunPlan, name: str) -> list[tuple[str, Any, DataFrame]]:
-    """Title, value and rows for each value of a parameter; all rows without a parameter."""
+def panels_of(frame: DataFrame, plan: RunPlan, name: str) -> list[tuple[str, DataFrame]]:
+    """Title and rows for each value of a parameter; all rows without a parameter."""
     import polars
 
     if not name:
-        return [("", None, frame)]
+        return [("", frame)]
     axis = plan.axis(name)
     return [
-        (f"{axis.title}: {short(value)}", value, frame.filter(polars.col(name) == value))
+        (f"{axis.title}: {short(value)}", frame.filter(polars.col(name) == value))
         for value in axis.labels()[:MAX_PANELS]
     ]
 
@@ -146,7 +134,7 @@ def curves_of(frame: DataFrame, plan: RunPlan, spec: Curves, number: int) -> Stu
     metric, x = metric_of(spec.metric), scale_of(plan.axis(spec.x))
     panels = [
         LinePanel(title, x, list(lines_of(rows, plan, spec, x)))
-        for title, _, rows in panels_of(frame, plan, spec.panels)
+        for title, rows in panels_of(frame, plan, spec.panels)
     ]
     caption = (
         f"{metric.sentence}, over {x.label}: median, and the range over the seeds and "
@@ -159,7 +147,7 @@ def lines_of(rows: DataFrame, plan: RunPlan, spec: Curves, x: Scale) -> Iterator
     """The lines of a panel."""
     import polars
 
-    for title, _, line_rows in panels_of(rows, plan, spec.lines):
+    for title, line_rows in panels_of(rows, plan, spec.lines):
         parts = [line_rows.filter(polars.col(spec.x) == value) for value in x.values]
         middle, low, high = np.array([_spread(part, spec.metric) for part in parts]).T
         yield MetricLine(title, x.places, middle, low, high)
@@ -176,18 +164,17 @@ def _spread(rows: DataFrame, metric: str) -> tuple[float, float, float]:
 def map_of(frame: DataFrame, plan: RunPlan, spec: Map, number: int) -> StudyFigure:
     """A map that a study asks for."""
     metric, x, y = metric_of(spec.metric), scale_of(plan.axis(spec.x)), scale_of(plan.axis(spec.y))
-    panels = []
-    for title, value, rows in panels_of(frame, plan, spec.panels):
-        bounds = bounds_of(plan, spec, value, x, y) if spec.bound else []
-        panels.append(Heat(title, x, y, *cells(rows, spec, metric, x, y), bounds))
+    panels = [
+        Heat(title, x, y, *cells(rows, spec, metric, x, y))
+        for title, rows in panels_of(frame, plan, spec.panels)
+    ]
     values = (
         "Most frequent outcome of the runs"
         if metric.words
         else f"{metric.sentence}: the median of the runs of each cell"
     )
-    bound = " The line is the stability boundary of the loop's linear model." if spec.bound else ""
     over = f"over {x.label} and {y.label}"
-    caption = f"{values}, {over}. Crosses: most runs were incomplete.{bound}"
+    caption = f"{values}, {over}. Crosses: most runs were incomplete."
     return StudyFigure(f"map{number}", caption, heat_figure(panels, metric.title))
 
 
@@ -242,7 +229,7 @@ def trend_lines(
     import polars
 
     known = frame.filter(polars.col(metric.name).is_not_null())
-    for title, _, rows in panels_of(known, plan, cases):
+    for title, rows in panels_of(known, plan, cases):
         if len(rows):
             ordered = rows.sort(name)
             x, y = ordered[name].to_numpy(), ordered[metric.name].to_numpy()
@@ -256,70 +243,3 @@ def _trend(values: Array, metric: Metric) -> Array:
     if metric.words:
         return np.full(3, values.mean())
     return np.quantile(values, (0.1, 0.5, 0.9))
-
-
-def bounds_of(plan: RunPlan, spec: Map, panel: Any, x: Scale, y: Scale) -> list[BoundaryLine]:
-    """Stability boundaries along each row of a map.
-
-    Args:
-        plan: of the study.
-        spec: the map, over two parameters that are numbers.
-        panel: value of its third parameter; None if it has none.
-        x: its axis across.
-        y: its axis upwards.
-    """
-    if not (x.numeric and y.numeric):
-        return []
-    fixed = {spec.panels: panel} if spec.panels else {}
-    low, high = float(x.places.min()), float(x.places.max())
-    lines: dict[int, list[tuple[float, float]]] = {}
-    for value in y.values:
-        rate = _growth_rate(plan, spec.x, {**fixed, spec.y: value})
-        for i, place in enumerate(sign_changes(rate, low, high, BOUND_STEPS, log=x.log)):
-            lines.setdefault(i, []).append((place, value))
-    return [
-        BoundaryLine("linear model: stability lost", *zip(*points, strict=True)) for points in lines.values()
-    ]
-
-
-def _growth_rate(plan: RunPlan, name: str, fixed: Mapping[str, Any]) -> Any:
-    """Growth rate of the linear model over a parameter's value: below 0 if stable, NaN without a model."""
-    values = {a.name: a.settings[len(a.settings) // 2] if a.settings else a.between(0.5) for a in plan.axes}
-    for a in plan.axes:
-        if a.name in fixed:
-            labels = a.labels()
-            values[a.name] = a.settings[labels.index(fixed[a.name])]
-
-    def rate(value: float) -> float:
-        try:
-            experiment = plan.experiment({**values, name: value})
-        except InputError:
-            return math.nan
-        if not isinstance(experiment, Experiment):
-            return math.nan
-        # The linear model has no friction: panels that differ in it alone share their boundary.
-        return _log_growth(with_values(equivalent(experiment), {"friction": {}}))
-
-    return rate
-
-
-@cache
-def _log_growth(experiment: Experiment) -> float:
-    try:
-        return math.log(linearise(experiment).growth)
-    except InputError:
-        return math.nan
-
-
-def equivalent(experiment: Experiment) -> Experiment:
-    """The experiment with the plain integrator that its neural controller is to first order.
-
-    Near small weights an output is A s(w) with the slope A/2 in its threshold w, and a tick's learning moves w by
-    eta e A/2: the command grows by eta (A/2)² e a tick, K_i = eta (A/2)²/Ts.
-    """
-    c = experiment.controller
-    if not isinstance(c, NeuralController):
-        return experiment
-    ki = c.learning_rate * (c.amplitude[0] / 2.0) ** 2 * experiment.run.rate
-    table = {"kind": "proportional-integral", "kp": c.kp, "kv": c.kv, "kf": c.kf, "ki": ki}
-    return with_values(experiment, {"controller": table})

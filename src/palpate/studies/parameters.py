@@ -7,8 +7,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from palpate.bench import with_values
-from palpate.bench.from_experiment import AnyExperiment
+from palpate.bench import Experiment, with_values
 from palpate.errors import InputError, unknown
 from palpate.studies.study import StudyParameter, flatten
 
@@ -17,12 +16,12 @@ Label = float | int | bool | str
 """A value as it stands in a table of results."""
 
 
-def tables_of(experiment: AnyExperiment) -> Tables:
+def tables_of(experiment: Experiment) -> Tables:
     """An experiment as nested tables that may be changed; lists in place of tuples."""
     return _thaw(msgspec.to_builtins(experiment))
 
 
-def experiment_of(base: AnyExperiment, tables: Tables) -> AnyExperiment:
+def experiment_of(base: Experiment, tables: Tables) -> Experiment:
     """The experiment with these tables.
 
     Raises:

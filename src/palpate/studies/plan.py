@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from palpate.bench.from_experiment import AnyExperiment, build_any, load_any
+from palpate.bench import Experiment, build, load
 from palpate.bench.toml_parts import ROLES
 from palpate.errors import InputError, PluginError
 from palpate.plugins import Plugin, is_plugin, plugin
@@ -61,7 +61,7 @@ class RunSetting:
 
     run: int
     at: dict[str, Label]
-    experiment: AnyExperiment | None
+    experiment: Experiment | None
     seed: int
     refused: str = ""
 
@@ -78,7 +78,7 @@ class RunPlan:
     """
 
     study: Study
-    bases: Mapping[str, AnyExperiment]
+    bases: Mapping[str, Experiment]
     axes: tuple[Axis, ...]
     seeds: tuple[int, ...]
 
@@ -121,7 +121,7 @@ class RunPlan:
             }
         return {a.name: values[a.name] for a in self.axes}
 
-    def experiment(self, values: Mapping[str, Any]) -> AnyExperiment:
+    def experiment(self, values: Mapping[str, Any]) -> Experiment:
         """The experiment with these values.
 
         Raises:
@@ -213,11 +213,11 @@ def plan_runs(study: Study, where: str = "") -> RunPlan:
     return planned
 
 
-def _load(name: str, folder: Path) -> AnyExperiment:
-    return load_any(str(folder / name) if name.endswith(".toml") else name)
+def _load(name: str, folder: Path) -> Experiment:
+    return load(str(folder / name) if name.endswith(".toml") else name)
 
 
-def _fix(base: AnyExperiment, fixed: Mapping[str, Any], name: str) -> AnyExperiment:
+def _fix(base: Experiment, fixed: Mapping[str, Any], name: str) -> Experiment:
     """An experiment with its constants."""
     tables = tables_of(base)
     try:
@@ -228,7 +228,7 @@ def _fix(base: AnyExperiment, fixed: Mapping[str, Any], name: str) -> AnyExperim
         raise type(error)(f"[fixed] does not fit the experiment {name}: {error}") from error
 
 
-def _case_tables(bases: Mapping[str, AnyExperiment], cases: list[dict[str, Any]]) -> Iterator[Tables]:
+def _case_tables(bases: Mapping[str, Experiment], cases: list[dict[str, Any]]) -> Iterator[Tables]:
     """The tables of the experiment of each case that makes one by itself."""
     for case in cases:
         changes = {key: value for key, value in case.items() if key != "experiment"}
@@ -243,7 +243,7 @@ def _check_values(plan: RunPlan) -> None:
     first_error: InputError | None = None
     for values in islice(corner_values(plan), MAX_TRIED):
         try:
-            build_any(plan.experiment(values))
+            build(plan.experiment(values))
         except PluginError:
             raise
         except InputError as error:

@@ -1,4 +1,4 @@
-"""One run of a study, from an experiment to a row of numbers, and many runs on the cores of this machine.
+"""One run of a study, from an experiment to a row of numbers; many runs on all cores.
 
 Compiled loops release the interpreter, so threads fill the cores.
 """
@@ -12,7 +12,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from typing import TypeVar
 
-from palpate.bench.from_experiment import AnyExperiment, build_any
+from palpate.bench import Experiment, build
 from palpate.bench.speed import cores
 from palpate.bench.summary import INTERRUPTED
 from palpate.errors import InputError
@@ -88,14 +88,14 @@ def run_one(
 
 
 def _record(
-    experiment: AnyExperiment, seed: int, stopped: Callable[[], bool], waiting: Callable[[], None] | None
+    experiment: Experiment, seed: int, stopped: Callable[[], bool], waiting: Callable[[], None] | None
 ) -> Record:
     def progress(_: float, __: str) -> None:
         if stopped():
             raise Stopped
 
     run = experiment.run
-    bench = build_any(experiment)
+    bench = build(experiment)
     record = bench.run(run.duration, seed, press=run.press, progress=progress, waiting=waiting)
     if record.meta["end"] == INTERRUPTED:  # the bench ends a run at Ctrl-C; a study stops there
         raise KeyboardInterrupt

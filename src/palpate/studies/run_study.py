@@ -90,7 +90,7 @@ def run(text: str, out: str | Path, *, where: str = "study", runner: StudyRunner
         text: the study's file.
         out: folder for the journal and the table.
         where: the file's path, for errors, and for experiments that lie beside it.
-        runner: `Local`, on all cores, when left out; or a `palpate.studies.cluster.Cluster`.
+        runner: `Local`, on all cores, when left out; or a `palpate.studies.run_one.Cluster`.
 
     Raises:
         InputError: what `palpate study` would refuse.
@@ -141,8 +141,6 @@ def _combinations(plan: RunPlan) -> Iterator[Experiment]:
     for values in islice(corner_values(plan), MAX_TRIED):
         try:
             experiment = plan.experiment(values)
-            if not isinstance(experiment, Experiment):
-                continue  # an experiment along one direction has no parts of the user's
             build(experiment)
         except PluginError:
             raise

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import msgspec
 from msgspec import Meta
@@ -65,8 +65,6 @@ class Map(Table, frozen=True):
     metric: str
     panels: str = ""
     """A third parameter: a panel for each of its values."""
-    bound: Literal["", "linear"] = ""
-    """Draws where the linear model of the loop loses its stability."""
 
 
 class Curves(Table, frozen=True):
@@ -105,7 +103,7 @@ class Study(Table, frozen=True, kw_only=True):
 
 T = TypeVar("T")
 _KEYS = frozenset(StudyParameter.__struct_fields__)
-FILES = TomlFiles("study", "a", "palpate.studies", ("shipped",))
+FILES = TomlFiles("study", "a", "palpate.studies", "shipped")
 names, source = FILES.names, FILES.source
 
 

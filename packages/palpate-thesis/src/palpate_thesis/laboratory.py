@@ -17,7 +17,7 @@ from palpate.environments import KelvinVoigtSurface
 from palpate.errors import InputError, unknown
 from palpate.files import read_toml
 
-FILES = TomlFiles("laboratory", "a", "palpate_thesis", ("laboratories",))
+FILES = TomlFiles("laboratory", "a", "palpate_thesis", "laboratories")
 KEYS = {"about", "base", "command", "sentences", "unknowns"}
 LINEAR, RELAXING, STIFFENING = 0.0, 1.0, 2.0
 """Laws of the foam: spring and damper, standard linear solid, Hunt and Crossley."""

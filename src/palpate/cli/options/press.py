@@ -12,7 +12,7 @@ from palpate.errors import InputError
 
 if TYPE_CHECKING:
     from palpate.contact_frame.payload import Payload
-    from palpate.environments.kelvin_voigt import KelvinVoigt
+    from palpate.environments.models import KelvinVoigt
     from palpate.press.prepare import PressSpec
 
 
@@ -107,7 +107,7 @@ class SimulatedOptions:
         Raises:
             InputError: --surface is given too, or the stiffness or the damping is unknown.
         """
-        from palpate.environments.kelvin_voigt import KelvinVoigt
+        from palpate.environments.models import KelvinVoigt
         from palpate.export.contact import LINEAR, Given, contact_from
         from palpate.force import load_arm
         from palpate.force.arm import names

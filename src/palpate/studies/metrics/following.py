@@ -108,18 +108,6 @@ def _of_force(key: str) -> Metric:
     return Metric(name, unit, text, of, better=LEAST)
 
 
-def _settles(window: Window) -> Value:
-    force = window.summary["force"]
-    return None if force is None else float(force["settling_s"] is not None)
-
-
-def _overshoot_share(window: Window) -> Value:
-    force = window.summary["force"]
-    if force is None or force["overshoot_N"] is None:
-        return None
-    return float(force["overshoot_N"]) / float(window.record["force_desired"][window.pressing][0])
-
-
 def rings(window: Window) -> bool:
     """True if the force oscillates at the end by more than the band within which it counts as settled."""
     force = window.summary["force"]
@@ -167,14 +155,6 @@ FOLLOWING = (
     Metric("peak_force", "N", "largest true force", _peak, better=LEAST),
     _of_force("settling_s"),
     _of_force("overshoot_N"),
-    Metric(
-        "settles",
-        "1",
-        "whether the force settles within 5 % of its first desired value",
-        _settles,
-        ("no", "yes"),
-    ),
-    Metric("overshoot_share", "1", "overshoot as a share of the first desired force", _overshoot_share),
     Metric(
         "integral_gain",
         "1/s",

@@ -10,8 +10,8 @@ change in distribution, 1971), for noise that is normal, white and known.
 from palpate._jit import law
 from palpate._jit.elementary import log
 from palpate._vector import Vec3
-from palpate.identifiers.kernels.dimension import Four, Vec4
-from palpate.identifiers.kernels.least_squares import long_run_variance, measure
+from palpate.identifiers.dimension import Four, Vec4
+from palpate.identifiers.least_squares import long_run_variance, measure
 
 ALARM = log(1e6)
 """Once in a million samples: at 480 Hz, in 35 minutes."""

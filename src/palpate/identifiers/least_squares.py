@@ -21,7 +21,7 @@ import numpy as np
 from palpate._jit import law, part
 from palpate._vector import Mat3, Vec3, outer, solve, sqrt, trace
 from palpate.arrays import Array
-from palpate.identifiers.kernels.dimension import Three
+from palpate.identifiers.dimension import Three
 
 SINGULAR = 1e300
 """Square of a solution of a root beyond which the root has lost a direction to rounding."""

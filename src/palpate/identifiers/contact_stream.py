@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate.arrays import Array
-from palpate.identifiers.kernels.contact_state import (
+from palpate.identifiers.contact_state import (
     CONTACTS,
     FIELDS,
     SAMPLE,
@@ -26,7 +26,7 @@ from palpate.identifiers.kernels.contact_state import (
     learn_in_contact,
     pending,
 )
-from palpate.identifiers.kernels.octave_sums import LENGTH, add_sample
+from palpate.identifiers.octave_sums import LENGTH, add_sample
 from palpate.signals.low_pass import FRACTIONS
 
 NAN = float("nan")

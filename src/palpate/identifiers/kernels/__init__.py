@@ -1,1 +1,0 @@
-"""Kernels of the estimators: compiled laws and parts on flat arrays."""
