@@ -4,16 +4,19 @@ import numpy as np
 import pytest
 
 from force.gained import gains_of
+from palpate.force.arm import load_arm
 from palpate.force.expected import (
     OVERSHOOT,
     RISES,
     STIFFENING_AT,
+    press_time,
     rise,
     settling_bound,
     softest,
     step_of,
     stiffening,
 )
+from palpate.force.gains import gains_for
 from palpate.force.simulated_press import pressed, surface, world_of
 
 ARMS = ("ur5e", pytest.param("fr3", marks=pytest.mark.long))
@@ -55,6 +58,42 @@ def test_softer_ones_settle_within_the_time_that_they_take_to_rise_out_of_the_no
     settled, _, bound, over = touches(name, lambda gains: 100.0)
     assert (settled > bound).sum() <= 5
     assert (over > OVERSHOOT).sum() <= 2
+
+
+SLOW = """title = "slow"
+rate = 100
+[inner]
+kind = "position"
+stiffness = 6e4
+delay = 0.05
+bandwidth = 2.5
+damping = 0.9
+[sensor]
+sampling = 480
+noise = 0.1
+low_pass = "butterworth3:120"
+full_scale = 100
+[limits]
+speed = 0.25
+stiffness = 1e6
+"""
+
+
+@pytest.mark.parametrize(
+    ("slow", "stiffness"), [(False, 300.0), (False, 3000.0), (True, 500.0), (True, 3000.0)]
+)
+def test_a_press_on_something_soft_takes_as_long_as_is_said(slow, stiffness, tmp_path):
+    """On a slow arm a soft surface passes for a drift: the gain stays that of the cap, and only the bound holds."""
+    (tmp_path / "slow.toml").write_text(SLOW)
+    arm = load_arm(str(tmp_path / "slow.toml") if slow else "ur5e")
+    gains = gains_for(arm, 20.0, cap=2e5 if slow else 1e5, force_max=100.0)
+    times = press_time(gains, stiffness)
+    wanted = np.full(round((times.most + 5.0) * arm.rate), 20.0)
+    force = pressed(world_of(arm, noise=0.1), surface(stiffness), gains.cautious(), 0.002, wanted, 0)[:, 0]
+    outside = np.flatnonzero(np.abs(force - 20.0) > 1.0)
+    settled = (outside[-1] + 1 - int(np.argmax(force > 0.0))) * arm.tick
+    assert times.least < settled < times.most
+    assert (settled > times.usual) == (slow and stiffness == 500.0)
 
 
 def test_the_rise_is_that_of_a_ramp_in_noise():

@@ -1,6 +1,6 @@
 """Tuning: gains from an arm and a surface, their predicted performance, and where they are proved."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from math import inf, isfinite
 from typing import Any
@@ -14,10 +14,13 @@ from palpate.force.certifying import certify, exact_interval
 from palpate.force.expected import (
     OVERSHOOT,
     RISES,
+    SOFT_TISSUE,
     STIFFENING_AT,
     Margins,
+    PressTime,
     Step,
     margins,
+    press_time,
     rise,
     settling_bound,
     softest,
@@ -99,8 +102,13 @@ class Tuning(Result):
 
     @property
     def softest(self) -> float:
-        """The softest surface that is known of [N/m]."""
-        return _softest(self.known, self.gains.cap)
+        """The softest surface that is known of, or a soft tissue [N/m]."""
+        return min(self.known.stiffness[0] if self.known else SOFT_TISSUE, self.gains.cap)
+
+    @property
+    def soft_press(self) -> PressTime:
+        """Time of a press on the softest surface."""
+        return press_time(self.gains, self.softest)
 
     @property
     def exact(self) -> tuple[float, float]:
@@ -147,6 +155,7 @@ class Tuning(Result):
             "speed_m_s": gains.speed,
             "force_max": gains.force_max,
             "price_s": None if self.price is None else self.price[0],
+            "soft_press": asdict(self.soft_press),
             "peak_N": self.peak,
             "peak_bound_N": self.peak_bound,
             "settling_s": _number(max(step.settling for step in self.steps)),

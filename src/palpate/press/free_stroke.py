@@ -155,7 +155,7 @@ def make_stroke(arm: MovableArm, plan: StrokePlan) -> FreeForce:
 def fit_free_force(rows: Array, length: float) -> FreeForce:
     """Fit the force over the position and its square; speed, acceleration and time are fitted beside them.
 
-    The acceleration takes the tool's inertia out of the slope. The press moves evenly, so that its own inertia is small.
+    The acceleration takes the tool's inertia out of the slope; the press moves too evenly to show it.
 
     Args:
         rows: time [s], position along the normal [m] and force along the normal [N], shape (n, 3).

@@ -75,9 +75,10 @@ def _force_max(tuning: Tuning) -> str:
     gains, price = tuning.gains, tuning.price
     if price is None:
         return "none: a hard surface behind a soft layer is met at the arm's speed (--force-max bounds the force)"
-    later = f"it takes {price[0]:.2g} s longer on {quantity(price[1], 'N/m')}"
-    speed = f"{1e3 * gains.speed:.3g} mm/s"
-    return f"at most {gains.force_max:g} N if something hard lies behind, by at most {speed}; {later}"
+    cost = f"{1e3 * gains.speed:.3g} mm/s, which costs {price[0]:.2g} s"
+    return (
+        f"at most {gains.force_max:g} N if something hard lies behind, by at most {cost}; {tuning.soft_press}"
+    )
 
 
 def _peak(tuning: Tuning) -> str:
