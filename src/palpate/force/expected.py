@@ -125,10 +125,11 @@ def press_time(gains: Gains, stiffness: float = SOFT_TISSUE) -> PressTime:
         + (force - error) / (felt * gains.approach)
         + log(error / (BAND * force)) / (felt * gains.gain)
     )
-    if limit is None:
-        return PressTime(stiffness, None, settling_bound(gains, stiffness), most)
-    least = arm.seen(gains.cap) * residual_travel(arm) / felt * log(limit / (limit - (1.0 - BAND) * force))
-    return PressTime(stiffness, least, settling_bound(gains, stiffness), most)
+    least = None
+    if limit is not None:
+        slowness = arm.seen(gains.cap) * residual_travel(arm) / felt
+        least = float(slowness * log(limit / (limit - (1.0 - BAND) * force)))
+    return PressTime(stiffness, least, settling_bound(gains, stiffness), float(most))
 
 
 def softest(gains: Gains) -> float:
