@@ -24,6 +24,7 @@ from palpate.bench.toml_parts import Role, check_protocol
 from palpate.errors import InputError, unknown
 from palpate.files import read_table, read_text
 from palpate.force import load_arm
+from palpate.force.ceiling import usual_force_max
 from palpate.force.gains import Gains, gains_for
 from palpate.plugins import is_plugin, look_in, plugin, reason
 
@@ -64,7 +65,8 @@ class ForceEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def gains(self, force: float) -> Gains:
         """Numbers of the arm and of the law that is tuned for it, for a desired force [N]."""
-        return gains_for(load_arm(self.arm), force)
+        arm = load_arm(self.arm)
+        return gains_for(arm, force, force_max=usual_force_max(force, arm.sensor))
 
     def build(self, gains: Gains) -> Any:
         """The controller as the simulator takes it.

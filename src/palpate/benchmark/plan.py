@@ -20,6 +20,11 @@ SWAY, SWAYS = 0.5, 3
 SWAY_FORCE = 0.25
 """Amplitude of the force that the surface's motion would cause on a tip that rests, of the desired force."""
 
+LAYER = 0.75
+"""Force at which the hardest surface of the test is met behind each other one, of the desired force."""
+CABLE = 0.1
+"""Force of a cable on the tool just before it lets go, at the surface, of the desired force."""
+
 
 @dataclass(frozen=True)
 class ForcePlan:
