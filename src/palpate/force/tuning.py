@@ -1,7 +1,6 @@
 """Tuning: gains from an arm and a surface, their predicted performance, and where they are proved."""
 
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
 from math import inf, isfinite
 from typing import Any
 
@@ -30,7 +29,6 @@ from palpate.force.expected import (
 from palpate.force.gains import Gains, gains_for, known_lag
 from palpate.force.known_surface import Known
 from palpate.force.lag import MIN_STIFFNESS, sum_of_lags
-from palpate.force.peak import peak_bound
 from palpate.records import Result
 
 RIGID = 1e9
@@ -76,11 +74,6 @@ class Tuning(Result):
         if not isinstance(inner, PositionLoop):
             peak = max(peak, gains.approach * float(np.sqrt(gains.cap * inner.mass)))
         return peak
-
-    @cached_property
-    def peak_bound(self) -> float | None:
-        """Bound of the first peak [N] while K_u is not below the stiffness; None for a torque arm."""
-        return peak_bound(self.gains)
 
     def surface_stiffness(self, kind: str) -> tuple[float, float] | None:
         """The proved interval of K + B/theta of the surface itself for a kind of claim [N/m]."""
@@ -157,7 +150,6 @@ class Tuning(Result):
             "price_s": None if self.price is None else self.price[0],
             "soft_press": asdict(self.soft_press),
             "peak_N": self.peak,
-            "peak_bound_N": self.peak_bound,
             "settling_s": _number(max(step.settling for step in self.steps)),
             "overshoot": self.overshoot,
             "margins": {
