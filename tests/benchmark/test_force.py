@@ -169,7 +169,7 @@ def test_a_result_is_ranked_by_its_failures_first():
     plan = ForcePlan(20.0, RATE)
     good, bad = exponential(20.0, 0.2, 0.1, 18.0), exponential(16.0, 0.2, 0.01, 18.0)
     results = [
-        ForceResult(name, "arm", plan, {1e3: (run_metrics(plan, force, plan.steady(), 1.0),)})
+        ForceResult(name, "arm", plan, {1e3: (run_metrics(plan, force, plan.steady(), 1.0, force, force),)})
         for name, force in (("bad", bad), ("good", good))
     ]
     assert [one.name for one in best_first(results)] == ["good", "bad"]
