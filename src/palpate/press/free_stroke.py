@@ -175,7 +175,7 @@ def fit_free_force(rows: Array, length: float) -> FreeForce:
 
 
 def subtraction_notes(stroke: Mapping[str, Any] | None) -> list[str]:
-    """What a stroke, as `FreeForce.to_json` has it, took off the readings of the press; nothing if it took nothing."""
+    """Name the slope that a stroke, as `FreeForce.to_json` has it, took off the readings of the press, if any."""
     if not stroke or not stroke["subtracted_N_per_m"]:
         return []
     text = "the force in free motion changes by {:.3g} N/m (std {:.2g}), which was subtracted"
