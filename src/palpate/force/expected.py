@@ -83,8 +83,8 @@ class PressTime:
         stiffness: K of the surface [N/m].
         least: that any law with this F_max takes [s]; None without F_max.
         usual: within which 99 % of first touches settle [s].
-        most: bound on a spring while K_u is at most the cap [s], also where the surface rises so slowly that it passes for a drift of
-            the sensor, or has hidden something hard: K_u then stays as high as the cap.
+        most: bound on a spring while K_u is at most the cap [s]: K_u stays that high where the surface rises so slowly
+            that it passes for a drift of the sensor, or has hidden something hard.
     """
 
     stiffness: float
