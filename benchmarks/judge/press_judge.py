@@ -1,34 +1,35 @@
 """Judge a force law by its public controller: does the true force ever exceed F_max?
 
     python benchmarks/judge/press_judge.py --arm ur5e --case layers --runs 1000
-    python benchmarks/judge/press_judge.py --arm fr3 --simulator mujoco --gains gains.toml --force-max 100
+    python benchmarks/judge/press_judge.py --simulator axis mujoco --runs 1000 200 --rows runs/presses.jsonl
 
 The judge shares no law, no constant and no file with palpate. It imports `palpate.force.ForceLoop` alone and makes
-gains by `palpate tune` from its own arm file, unless --gains names some. `--law stop` judges in its place the simplest
-law with an F_max: at the ceiling (F_max - F_d - 4 N)/(K_eff theta + sqrt(K m)) to F_d, then back only. Without F_max,
-in the gains or by --force-max, five times the force takes its place in the columns, and no run is condemned.
+gains by `palpate tune` from its own arm file. `--law stop` judges in its place the simplest law with an F_max: at the
+ceiling (F_max - F_d - 4 N)/(K_eff theta + sqrt(K m)) to F_d, then back only. `--rows` keeps each run as it ends: the
+same command goes on where it stopped, and runs with other gains, or another form of the law, are made again.
 
-Columns: the largest true force [N] (p50, p95, most); runs above F_max; runs in which the tip was faster than the
-approach before any touch; runs that settle, and the time from the touch until the force stays within 5 % [s] (p50, p95;
-infinite if it does not settle; where the reading has an error, its largest is added to the 5 %). The last columns are
-lower bounds of p95, on the same draws, of any law that guarantees F_max: (K_eff theta/K) ln(F_max/(F_max - F_d)), and
-with K_eff theta + sqrt(K_cap m) in place of K_eff theta. Exit code 1 if a run was above.
+Columns, for each simulator: runs above F_max; the largest true force [N]; runs in which the tip was faster than the
+approach before any touch; runs that settle; p95 of the time from the touch until the force stays within 5 % [s]
+(infinite if it does not settle; where the reading has an error, its largest is added to the 5 %). The last column is a
+lower bound of it, on the draws of the first simulator, for any law that guarantees F_max:
+(K_eff theta/K) ln(F_max/(F_max - F_d)). Exit code 1 if a run was above.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from press_draws import ACCURACY, ARMS, JITTER, MAX_TOOL, MISSED, Arm, Draw, arm_file, draw_press
+from press_draws import ACCURACY, ARMS, JITTER, MISSED, Arm, Draw, arm_file, draw_press
 from press_simulators import SIMULATORS, Axis, Engine
 
 CASES = ("clean", "layers", "cable", "pose", "drift")
@@ -38,7 +39,6 @@ REST = 0.75  # s in the band, after which a run ends early
 WINDOW = 0.02  # s, over which the tip's speed in free motion is averaged
 FAST = 1.25  # of the approach: an inner loop overshoots by less
 BACKWARDS = 1e-4  # m/s per newton, at which the simplest law withdraws
-SIMILAR = 0.15  # relative difference of the gains' arm from the judge's, up to which nothing is said
 
 
 class Law(Protocol):
@@ -113,20 +113,48 @@ def settling_time(times: np.ndarray, forces: np.ndarray, force: float, band: flo
     return float(times[outside[-1] + 1]) if len(outside) else 0.0
 
 
-def judge(make: Callable[[], Law], case: str, args: argparse.Namespace, approach: float) -> dict[str, float]:
-    """Press `args.runs` times; the quantities of a row of the table."""
-    arm = ARMS[args.arm]
-    draws = [draw_press(arm, case, args.force, args.cap, args.seed + k) for k in range(args.runs)]
-    runs = [press(make(), SIMULATORS[args.simulator](draw), draw, args.force, approach) for draw in draws]
-    peaks, settling = np.array([r.peak for r in runs]), np.array([r.settling for r in runs])
-    force_max = args.force_max or 5 * args.force
-    slopes = arm.pushed(args.cap), arm.pushed(args.cap) + arm.swung(args.cap)
-    bounds = [[draw.least_time(args.force, force_max, slope) for draw in draws] for slope in slopes]
-    row = {"runs": len(runs), "peak_p50_N": quantile(peaks, 0.5), "peak_p95_N": quantile(peaks, 0.95)}
-    row |= {"peak_N": float(peaks.max()), "above": int(np.count_nonzero(peaks > force_max))}
-    row |= {"fast": sum(run.fast for run in runs), "settled": int(np.count_nonzero(np.isfinite(settling)))}
-    row |= {"settling_p50_s": quantile(settling, 0.5), "settling_p95_s": quantile(settling, 0.95)}
-    return row | {"bound_p95_s": quantile(bounds[0], 0.95), "bound_mass_p95_s": quantile(bounds[1], 0.95)}
+class Candidate(NamedTuple):
+    """A law to be judged on an arm."""
+
+    arm: str
+    make: Callable[[], Law]  # the law in free motion
+    approach: float  # m/s
+    digest: str  # of everything that its runs depend on, beside the draw
+
+
+def press_all(
+    law: Candidate, case: str, simulator: str, draws: list[Draw], args: argparse.Namespace
+) -> list[Run]:
+    """Press once for each draw, but for runs that stand in the file of rows."""
+    lines = args.rows.read_text(encoding="utf-8").splitlines() if args.rows and args.rows.exists() else []
+    known = {tuple(key): Run(*run) for key, run in map(json.loads, lines)}
+    keys = [(law.digest, simulator, case, draw.seed) for draw in draws]
+    for key, draw in zip(keys, draws, strict=True):
+        if key not in known:
+            known[key] = press(law.make(), SIMULATORS[simulator](draw), draw, args.force, law.approach)
+            if args.rows:
+                with args.rows.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps([key, known[key]]) + "\n")
+    return [known[key] for key in keys]
+
+
+def judge(law: Candidate, case: str, args: argparse.Namespace) -> tuple[str, int]:
+    """Press in each simulator; a row of the table, and the runs above F_max."""
+    arm, count = ARMS[law.arm], args.seed + max(args.runs)
+    draws = [draw_press(arm, case, args.force, args.cap, seed) for seed in range(args.seed, count)]
+    row, above = f"{law.arm:7}{case:7}", 0
+    for simulator, runs in zip(args.simulator, args.runs, strict=True):
+        made = press_all(law, case, simulator, draws[:runs], args)
+        peaks, settling = np.array([run.peak for run in made]), np.array([run.settling for run in made])
+        beyond, settled = np.count_nonzero(peaks > args.force_max), np.count_nonzero(np.isfinite(settling))
+        row += f"{beyond:6}{peaks.max():7.1f}{sum(run.fast for run in made):6}{settled:8}"
+        row += f"{quantile(settling, 0.95):7.2f}"
+        above += beyond
+    least = [
+        draw.least_time(args.force, args.force_max, arm.pushed(args.cap)) for draw in draws[: args.runs[0]]
+    ]
+    row += f"{quantile(least, 0.95):7.2f}"
+    return row, above
 
 
 def quantile(values: list[float] | np.ndarray, fraction: float) -> float:
@@ -134,90 +162,73 @@ def quantile(values: list[float] | np.ndarray, fraction: float) -> float:
     return float(np.quantile(values, fraction, method="higher"))
 
 
-def tune(args: argparse.Namespace, folder: Path) -> Path:
-    """Make gains by `palpate tune` for the judge's own arm file."""
-    file, gains = folder / "arm.toml", folder / "gains.toml"
-    file.write_text(arm_file(ARMS[args.arm], f"The judge's {args.arm}"), encoding="utf-8")
-    command = [Path(sys.executable).with_name("palpate"), "tune", "--arm", file, "--out", gains]
-    command += ["--force", f"{args.force}:N", "--stiffness", f"100:{args.cap}"]
-    command += ["--force-max", f"{args.force_max}:N"] if args.force_max else []
-    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)  # noqa: S603
-    if not gains.exists():
-        sys.exit(f"palpate tune: {done.stderr.strip() or done.stdout.strip()}")
-    return gains
+def tune(name: str, args: argparse.Namespace) -> str:
+    """Gains by `palpate tune` for the judge's own arm file."""
+    with tempfile.TemporaryDirectory() as folder:
+        file, gains = Path(folder, "arm.toml"), Path(folder, "gains.toml")
+        file.write_text(arm_file(ARMS[name], f"The judge's {name}"), encoding="utf-8")
+        command = [Path(sys.executable).with_name("palpate"), "tune", "--arm", file, "--out", gains]
+        command += ["--force", f"{args.force}:N", "--stiffness", f"100:{args.cap}"]
+        command += ["--force-max", f"{args.force_max}:N"]
+        done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)  # noqa: S603
+        if not gains.exists():
+            sys.exit(f"palpate tune: {done.stderr.strip() or done.stdout.strip()}")
+        return gains.read_text(encoding="utf-8")
 
 
-def differences(inner: dict[str, float], arm: Arm) -> list[str]:
-    """Numbers of the gains' arm that are far from the judge's: then the theorem's assumptions are not met."""
-    middle = {"mass": arm.mass + MAX_TOOL / 2, "stiffness": arm.stiffness, "delay": arm.delay}
-    middle["damping"] = arm.ratio if arm.kind == "position" else arm.damping
-    stated = {name: (inner.get(name, 0.0), value) for name, value in middle.items()}
-    return [f"{name} {a:g}, judged with {b:g}" for name, (a, b) in stated.items() if abs(a / b - 1) > SIMILAR]
-
-
-def show(rows: dict[str, dict[str, float]], args: argparse.Namespace) -> None:
-    """Print a row of the table for each case."""
-    limit = f"{args.force_max:g} N" if args.force_max else f"none, in its place {5 * args.force:g} N"
-    theta = 1000 * ARMS[args.arm].theta
-    print(
-        f"{args.arm}, {args.simulator}: {args.force:g} N, cap {args.cap:g} N/m, theta {theta:.1f} ms, F_max {limit}"
+def stop_law(name: str, args: argparse.Namespace) -> Candidate:
+    """The simplest law with an F_max."""
+    speed = ceiling(ARMS[name], args.force, args.force_max, args.cap)
+    return Candidate(
+        name, lambda: StopLaw(speed, args.force), speed, f"stop {name} {speed} {args.force} {args.cap}"
     )
-    head = ("runs", "peak", "p95", "most", "above", "fast", "settled", "p50", "p95", "bound", "+ mass")
-    print(f"{'case':8}" + "".join(f"{name:>8}" for name in head))
-    for case, row in rows.items():
-        numbers = [
-            f"{row[key]:.{1 if key.endswith('N') else 2 if key.endswith('_s') else 0}f}" for key in row
-        ]
-        print(f"{case:8}" + "".join(f"{number:>8}" for number in numbers))
 
 
-def judge_stop_law(args: argparse.Namespace, cases: Sequence[str]) -> dict[str, dict[str, float]]:
-    """Rows of the simplest law with an F_max."""
-    args.force_max = args.force_max or 5 * args.force
-    speed = ceiling(ARMS[args.arm], args.force, args.force_max, args.cap)
-    return {case: judge(lambda: StopLaw(speed, args.force), case, args, speed) for case in cases}
-
-
-def judge_palpate(args: argparse.Namespace, cases: Sequence[str]) -> dict[str, dict[str, float]]:
-    """Rows of palpate's law with the given gains, or with its own for the judge's arm."""
+def palpate_law(name: str, args: argparse.Namespace) -> Candidate:
+    """palpate's law with its own gains for the judge's arm."""
     from palpate.force import ForceLoop
 
+    text = tune(name, args)
     with tempfile.TemporaryDirectory() as folder:
-        path = args.gains or tune(args, Path(folder))
-        gains = tomllib.loads(path.read_text(encoding="utf-8"))
-        for text in differences(gains["arm"]["inner"], ARMS[args.arm]):
-            print(f"the gains' arm has {text}", file=sys.stderr)
-        args.force_max = args.force_max or gains.get("force_max")
-        return {case: judge(lambda: ForceLoop.load(path), case, args, gains["approach"]) for case in cases}
+        Path(folder, "gains.toml").write_text(text, encoding="utf-8")
+        loop = ForceLoop.load(Path(folder, "gains.toml"))
+
+    def reset() -> Law:
+        loop.reset()
+        return loop
+
+    return Candidate(name, reset, tomllib.loads(text)["approach"], hashlib.sha256(text.encode()).hexdigest())
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--arm", choices=ARMS, default="ur5e")
-    parser.add_argument("--case", choices=[*CASES, "all"], default="all")
-    parser.add_argument("--simulator", choices=SIMULATORS, default="axis")
-    parser.add_argument("--runs", type=int, default=100, help="presses of each case")
+    parser.add_argument("--arm", nargs="+", choices=ARMS, default=[*ARMS])
+    parser.add_argument("--case", nargs="+", choices=CASES, default=CASES)
+    parser.add_argument("--simulator", nargs="+", choices=SIMULATORS, default=["axis"])
+    parser.add_argument("--runs", nargs="+", type=int, default=[100], help="of each case, for each simulator")
     parser.add_argument("--seed", type=int, default=0, help="of the first press; the next has the next")
     parser.add_argument("--force", type=float, default=20.0, help="desired force [N]")
-    parser.add_argument("--force-max", type=float, help="F_max of `palpate tune` [N]")
+    parser.add_argument("--force-max", type=float, default=100.0, help="F_max of `palpate tune` [N]")
     parser.add_argument("--cap", type=float, default=1e5, help="stiffest surface [N/m]")
-    parser.add_argument(
-        "--gains", type=Path, help="file of `palpate tune`, for an arm within the judge's intervals"
-    )
     parser.add_argument("--law", choices=("palpate", "stop"), default="palpate")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--rows", type=Path, help="file of runs, to go on with")
     args = parser.parse_args()
-    chosen = CASES if args.case == "all" else (args.case,)
-    rows = (judge_stop_law if args.law == "stop" else judge_palpate)(args, chosen)
-    if args.json:
-        finite = {c: {k: v if np.isfinite(v) else None for k, v in row.items()} for c, row in rows.items()}
-        answer = {"arm": args.arm, "theta_s": ARMS[args.arm].theta, "force_max": args.force_max}
-        print(json.dumps(answer | {"cases": finite}))
-    else:
-        show(rows, args)
-    sys.exit(int(bool(args.force_max) and any(row["above"] for row in rows.values())))
+    print(f"{args.force:g} N, F_max {args.force_max:g} N, cap {args.cap:g} N/m, from seed {args.seed}")
+    print(
+        " " * 14 + "".join(f"{f'{s}, {n} runs':>34}" for s, n in zip(args.simulator, args.runs, strict=True))
+    )
+    columns = f"{'above':>6}{'most':>7}{'fast':>6}{'settled':>8}{'p95':>7}" * len(args.simulator)
+    print(f"{'arm':7}{'case':7}{columns}{'bound':>7}")
+    above = 0
+    for name in args.arm:
+        law = (stop_law if args.law == "stop" else palpate_law)(name, args)
+        for case in args.case:
+            row, beyond = judge(law, case, args)
+            print(row, flush=True)
+            above += beyond
+    sys.exit(int(above > 0))
 
 
 if __name__ == "__main__":

@@ -85,7 +85,10 @@ def test_a_delayed_copy_of_the_desired_force_has_its_response_and_rejects_nothin
     assert ratio == pytest.approx(np.exp(-2j * np.pi * np.array(LINES) / PERIOD * late / RATE), abs=1e-9)
     t = np.arange(len(plan.steady())) / RATE
     swayed = plan.steady() + 5.0 * np.sin(np.pi * t)
-    found = run_metrics(plan, force, swayed, at_rest=5.0)
+    hard, soft = (exponential(peak, 0.5, 0.1, 4.0) for peak in (60.0, 20.0))
+    found = run_metrics(plan, force, swayed, 5.0, hard, soft)
+    assert (found.layers.overshoot, found.layers.settling) == (pytest.approx(2.0), None)
+    assert found.cable.settling == pytest.approx(0.1 * np.log(20.0), abs=2 / RATE)
     assert found.disturbance == pytest.approx(1.0, rel=1e-3)
     assert found.bandwidth is None
     assert found.resonance == pytest.approx(1.0)
@@ -110,6 +113,13 @@ def test_every_entry_gets_the_same_presses_and_the_law_passes_where_an_integral_
     assert cautious.runs == again.runs
     assert cautious.passes == 2
     integral = press_surfaces(entry, 20.0, surfaces)
+    for runs in (cautious.runs, integral.runs):
+        assert runs[1].layers.overshoot == pytest.approx(
+            runs[1].touch.overshoot, abs=0.02
+        )  # the hardest hides none
+    assert (
+        cautious.runs[0].touch.overshoot + 0.2 < cautious.runs[0].layers.overshoot < 4.0
+    )  # F_max is five times 20 N
     assert integral.passes < 2
     assert best_first([integral, cautious])[0] is cautious
     assert "2 of 2 presses" in sentence([integral, cautious])
@@ -157,7 +167,7 @@ def test_a_result_is_ranked_by_its_failures_first():
     plan = ForcePlan(20.0, RATE)
     good, bad = exponential(20.0, 0.2, 0.1, 18.0), exponential(16.0, 0.2, 0.01, 18.0)
     results = [
-        ForceResult(name, "arm", plan, {1e3: (run_metrics(plan, force, plan.steady(), 1.0),)})
+        ForceResult(name, "arm", plan, {1e3: (run_metrics(plan, force, plan.steady(), 1.0, force, force),)})
         for name, force in (("bad", bad), ("good", good))
     ]
     assert [one.name for one in best_first(results)] == ["good", "bad"]

@@ -1,19 +1,23 @@
 """What is said of first touches holds for draws of them."""
 
+import msgspec
 import numpy as np
 import pytest
 
 from force.gained import gains_of
+from palpate.force.arm import load_arm
 from palpate.force.expected import (
     OVERSHOOT,
     RISES,
     STIFFENING_AT,
+    press_time,
     rise,
     settling_bound,
     softest,
     step_of,
     stiffening,
 )
+from palpate.force.gains import gains_for
 from palpate.force.simulated_press import pressed, surface, world_of
 
 ARMS = ("ur5e", pytest.param("fr3", marks=pytest.mark.long))
@@ -55,6 +59,25 @@ def test_softer_ones_settle_within_the_time_that_they_take_to_rise_out_of_the_no
     settled, _, bound, over = touches(name, lambda gains: 100.0)
     assert (settled > bound).sum() <= 5
     assert (over > OVERSHOOT).sum() <= 2
+
+
+@pytest.mark.parametrize(
+    ("slow", "stiffness"), [(False, 300.0), (False, 3000.0), (True, 500.0), (True, 3000.0)]
+)
+def test_a_press_on_something_soft_takes_as_long_as_is_said(slow, stiffness):
+    """On a slow arm a soft surface passes for a drift: the gain stays that of the cap, and only the bound holds."""
+    arm = load_arm("ur5e")
+    if slow:
+        inner = msgspec.structs.replace(arm.inner, stiffness=6e4, delay=0.05, bandwidth=2.5, damping=0.9)
+        arm = msgspec.structs.replace(arm, rate=100.0, inner=inner)
+    gains = gains_for(arm, 20.0, cap=2e5 if slow else 1e5, force_max=100.0)
+    times = press_time(gains, stiffness)
+    wanted = np.full(round((times.most + 5.0) * arm.rate), 20.0)
+    force = pressed(world_of(arm, noise=0.1), surface(stiffness), gains.cautious(), 0.002, wanted, 0)[:, 0]
+    outside = np.flatnonzero(np.abs(force - 20.0) > 1.0)
+    settled = (outside[-1] + 1 - int(np.argmax(force > 0.0))) * arm.tick
+    assert times.least < settled < times.most
+    assert (settled > times.usual) == (slow and stiffness == 500.0)
 
 
 def test_the_rise_is_that_of_a_ramp_in_noise():

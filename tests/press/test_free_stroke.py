@@ -20,7 +20,7 @@ from press.test_press import prepare_press, question, simulated
 from wires.simulated import simulated_arm
 from wires.slow_cell import WORDS, cell
 
-STROKE = {"length": 0.02, "slope": (0.0, 1.0), "bend": (0.0, 10.0), "inertia": (0.0, 0.1), "rest": 0.03}
+STROKE = {"length": 0.02, "slope": (0.0, 1.0), "bend": (0.0, 10.0), "rest": 0.03}
 LEVEL = 0.2
 
 
@@ -43,11 +43,11 @@ def rows(seed, slope=0.0, bend=0.0, mass=0.0, drift=0.0):
 
 
 @pytest.mark.parametrize("world", [{}, {"slope": 30.0, "mass": 1.5, "drift": 0.3}, {"slope": -8.0}])
-def test_slope_and_inertia_have_honest_intervals(world):
-    fits = [fit_free_force(rows(seed, **world), 0.02) for seed in range(400)]
-    for name, true in (("slope", world.get("slope", 0.0)), ("inertia", world.get("mass", 0.0))):
-        value, std = np.array([getattr(fit, name) for fit in fits]).T
-        assert np.mean(np.abs(value - true) < 2.0 * std) == pytest.approx(0.95, abs=0.03), name
+def test_the_slope_has_an_honest_interval(world):
+    """Whatever the tool's mass: its inertia is not in the slope."""
+    slopes = [fit_free_force(rows(seed, **world), 0.02).slope for seed in range(400)]
+    value, std = np.array(slopes).T
+    assert np.mean(np.abs(value - world.get("slope", 0.0)) < 2.0 * std) == pytest.approx(0.95, abs=0.03)
 
 
 def test_only_what_is_sure_and_matters_is_subtracted():
@@ -88,6 +88,7 @@ def test_a_cable_is_taken_off_a_simulated_press(tmp_path):
     )
     assert main(["press", "--arm", "ur5e", *words, "--free-force", "cable=100:N/m"]) == 0
     summary = json.loads((tmp_path / "p" / "summary.json").read_text())
+    assert "which was subtracted" in (tmp_path / "p" / "report.html").read_text()
     assert summary["free_stroke"]["subtracted_N_per_m"] == pytest.approx(100.0, abs=5.0)
     low, high = summary["identified"]["parameters"]["K"]["ci95"]
     assert low < 500.0 < high < 590.0

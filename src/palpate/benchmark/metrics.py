@@ -22,6 +22,11 @@ SWAY, SWAYS = 0.5, 3
 SWAY_FORCE = 0.25
 """Amplitude of the force that the surface's motion would cause on a tip that rests, of the desired force."""
 
+LAYER = 0.75
+"""Force at which the hardest surface of the test is met behind each other one, of the desired force."""
+CABLE = 0.1
+"""Force of a cable on the tool just before it lets go, at the surface, of the desired force."""
+
 
 @dataclass(frozen=True)
 class ForcePlan:
@@ -209,6 +214,8 @@ class RunMetrics:
         bandwidth: of force over desired force [Hz]; None beyond the plan's highest frequency.
         resonance: largest size of that ratio.
         disturbance: rms error while the surface moves, over the one of a tip that rests.
+        layers: the first contact where something hard lies behind the surface.
+        cable: the first contact where a cable pulls at the tool before it.
     """
 
     touch: TouchMetrics
@@ -217,9 +224,13 @@ class RunMetrics:
     bandwidth: float | None
     resonance: float
     disturbance: float
+    layers: TouchMetrics
+    cable: TouchMetrics
 
 
-def run_metrics(plan: ForcePlan, force: Array, moving: Array, at_rest: float) -> RunMetrics:
+def run_metrics(
+    plan: ForcePlan, force: Array, moving: Array, at_rest: float, layers: Array, cable: Array
+) -> RunMetrics:
     """Metrics of a run.
 
     Args:
@@ -227,6 +238,8 @@ def run_metrics(plan: ForcePlan, force: Array, moving: Array, at_rest: float) ->
         force: on the surface in a run of it [N], shape (n,).
         moving: the same while the surface moves and F_d is constant [N], shape (m,).
         at_rest: amplitude of the force that this motion causes on a tip that rests [N].
+        layers: on something hard behind the surface, F_d constant [N], shape (m,).
+        cable: on the surface, while a cable pulls at the tool [N], shape (m,).
     """
     first, second, third, _ = plan.starts
     high = (1.0 + STEP_HEIGHT) * plan.force
@@ -241,4 +254,6 @@ def run_metrics(plan: ForcePlan, force: Array, moving: Array, at_rest: float) ->
         bandwidth(np.array(LINES) / PERIOD, ratio),
         float(np.abs(ratio).max()),
         float(np.sqrt(np.mean((last - plan.force) ** 2)) / (at_rest / math.sqrt(2.0))),
+        touch(layers, plan.force, plan.rate),
+        touch(cable, plan.force, plan.rate),
     )

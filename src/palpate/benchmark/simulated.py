@@ -12,10 +12,11 @@ import numpy as np
 from palpate._jit import part
 from palpate.arrays import Array
 from palpate.bench.toml_parts import Role, check_protocol
-from palpate.benchmark.metrics import SWAY, SWAY_FORCE, ForcePlan, RunMetrics, run_metrics
+from palpate.benchmark.metrics import CABLE, LAYER, SWAY, SWAY_FORCE, ForcePlan, RunMetrics, run_metrics
 from palpate.errors import InputError, unknown
 from palpate.files import read_table, read_text
 from palpate.force import load_arm
+from palpate.force.ceiling import usual_force_max
 from palpate.force.gains import Gains, gains_for
 from palpate.force.simulated_press import pressed, surface, world_of
 from palpate.plugins import is_plugin, look_in, plugin, reason
@@ -57,7 +58,8 @@ class ForceEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def gains(self, force: float) -> Gains:
         """Numbers of the arm and of the law that is tuned for it, for a desired force [N]."""
-        return gains_for(load_arm(self.arm), force)
+        arm = load_arm(self.arm)
+        return gains_for(arm, force, force_max=usual_force_max(force, arm.sensor))
 
     def build(self, gains: Gains) -> Any:
         """The controller as the simulator takes it.
@@ -241,7 +243,9 @@ def press_surfaces(
     for k, stiffness in enumerate(surfaces.stiffness.tolist()):
         presses = []
         for i in range(surfaces.repeats):
-            presses.append(_press(gains, control, plan, stiffness, [surfaces.seed, k, i], waiting))
+            presses.append(
+                _press(gains, control, plan, (stiffness, surfaces.high), [surfaces.seed, k, i], waiting)
+            )
             show(k * surfaces.repeats + i + 1, surfaces.count * surfaces.repeats)
         results[stiffness] = tuple(presses)
     return ForceResult(entry.name, gains.arm.title, plan, results)
@@ -251,20 +255,28 @@ def _press(
     gains: Gains,
     control: Any,
     plan: ForcePlan,
-    K: float,
+    stiffness: tuple[float, float],
     seed: Sequence[int],
     waiting: Callable[[], None] | None,
 ) -> RunMetrics:
-    """Metrics of a press on a stiffness, at rest and swaying."""
-    arm = gains.arm
+    """Metrics of presses on a stiffness: at rest, swaying, before the hardest of the test, and with a cable."""
+    arm, (K, hardest) = gains.arm, stiffness
     rng = np.random.default_rng([*seed, 0])
     mass = arm.inner.mass if arm.kind != "position" else 1.0
     B = 2.0 * float(np.exp(rng.uniform(*np.log(DAMPING_RATIO)))) * np.sqrt(K * (mass or 1.0))
     world = world_of(arm, noise=arm.sensor.noise, phase=float(rng.uniform(0.0, 1.0 / arm.sensor.sampling)))
     gap = GAP * gains.approach
     at_rest = SWAY_FORCE * plan.force
-    rows = pressed(world, surface(K, B), control, gap, plan.desired_force(), [*seed, 1], waiting)
     series = K if arm.kind == "torque" else arm.seen(K)
-    swaying = surface(K, B, sway=at_rest / series, frequency=2.0 * np.pi * SWAY)
-    moving = pressed(world, swaying, control, gap, plan.steady(), [*seed, 2], waiting)
-    return run_metrics(plan, rows[:, 0], moving[:, 0], at_rest)
+    rows = pressed(world, surface(K, B), control, gap, plan.desired_force(), [*seed, 1], waiting)[:, 0]
+    moving, layers, cable = (
+        pressed(world, surface(K, B, **others), control, gap, plan.steady(), [*seed, 2 + i], waiting)[:, 0]
+        for i, others in enumerate(
+            (
+                {"sway": at_rest / series, "frequency": 2.0 * np.pi * SWAY},
+                {"thickness": LAYER * plan.force / K, "behind": hardest - K},
+                {"cable": CABLE * plan.force / gap},
+            )
+        )
+    )
+    return run_metrics(plan, rows, moving, at_rest, layers, cable)

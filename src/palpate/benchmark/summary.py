@@ -8,6 +8,8 @@ import numpy as np
 
 from palpate.bench.summary import BAND
 from palpate.benchmark.metrics import (
+    CABLE,
+    LAYER,
     LINES,
     MAX_OVERSHOOT,
     PERIOD,
@@ -49,6 +51,10 @@ def summarise_runs(runs: Sequence[RunMetrics]) -> dict[str, Any]:
         "bandwidth_Hz": float(np.median(bandwidths)) if len(bandwidths) > len(runs) / 2 else None,
         "resonance": _finite(max(r.resonance for r in runs)),
         "disturbance": _median(r.disturbance for r in runs),
+        "layers_settling_s": _median(r.layers.settling for r in runs),
+        "layers_overshoot": _finite(max(r.layers.overshoot for r in runs)),
+        "cable_settling_s": _median(r.cable.settling for r in runs),
+        "cable_overshoot": _finite(max(r.cable.overshoot for r in runs)),
     }
 
 
@@ -86,7 +92,7 @@ def as_values(results: Sequence[ForceResult]) -> dict[str, Any]:
 def describe_plan(plan: ForcePlan) -> dict[str, Any]:
     """The test in numbers, so that a result can be compared with another."""
     return {
-        "version": 1,
+        "version": 2,
         "force_N": plan.force,
         "band": BAND,
         "overshoot_limit": MAX_OVERSHOOT,
@@ -94,6 +100,8 @@ def describe_plan(plan: ForcePlan) -> dict[str, Any]:
         "frequencies_Hz": [k / PERIOD for k in LINES],
         "sway_Hz": SWAY,
         "sway_force": SWAY_FORCE,
+        "layer_force": LAYER,
+        "cable_force": CABLE,
     }
 
 
@@ -136,15 +144,23 @@ def _cells(runs: Sequence[RunMetrics]) -> dict[str, str]:
     """Text of each column."""
     numbers = summarise_runs(runs)
     highest = "-" if numbers["resonance"] is None else f"> {HIGHEST:g}"
-    settling = numbers["settling_s"]
+    hidden = {
+        name: f"{_percent(numbers[f'{name}_overshoot'])}, {_seconds(numbers[f'{name}_settling_s'])}"
+        for name in ("layers", "cable")
+    }
     return {
         "passed": f"{numbers['passed']} of {numbers['presses']}",
-        "settling": "-" if settling is None else f"{settling:.2f} s",
+        "settling": _seconds(numbers["settling_s"]),
         "over": _percent(numbers["overshoot"]),
         "Hz": highest if numbers["bandwidth_Hz"] is None else plain(numbers["bandwidth_Hz"], 2),
         "sway": plain(numbers["disturbance"], 2),
+        **hidden,
     }
 
 
-def _percent(fraction: float) -> str:
-    return f"{100 * fraction:.1f} %" if math.isfinite(fraction) else "-"
+def _seconds(time: float | None) -> str:
+    return "-" if time is None else f"{time:.2f} s"
+
+
+def _percent(fraction: float | None) -> str:
+    return "-" if fraction is None or not math.isfinite(fraction) else f"{100 * fraction:.1f} %"

@@ -18,8 +18,9 @@ from palpate.cli.toolkit import command, print_answer, print_lines, say
 from palpate.errors import InputError
 from palpate.force import ForceLoop
 from palpate.force.ceiling import check_same_force_max, reading_error
+from palpate.force.expected import press_time
 from palpate.press.engines import mass_note
-from palpate.press.free_stroke import MAX_STROKE
+from palpate.press.free_stroke import MAX_STROKE, subtraction_notes
 from palpate.wires.at_rest import AtRest, check_at_rest, retune_for_noise, tool_notes
 from palpate.wires.opening import open_wire, wire_class_name
 from palpate.wires.order import (
@@ -210,7 +211,7 @@ def _describe_plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
         if gains.force_max is None
         else f"if something hard lies behind: at most {gains.force_max:g} N, by a commanded speed of at most"
         f" {1e3 * gains.speed_at(task.force):.3g} mm/s, while a reading is off by at most"
-        f" {reading_error(gains.arm, task.force):.3g} N"
+        f" {reading_error(gains.arm, task.force):.3g} N; {press_time(gains)}"
     )
     last = 1e3 * (gains.theta + gains.arm.tick)
     path = task.path
@@ -287,12 +288,7 @@ def _print_outcome(outcome: Outcome, words: str, where: Path | None, json: bool)
     lines = [f"ended: {outcome.ended}; the arm rests", outcome.unloading.how]
     if not outcome.touched:
         lines.append("no surface was held before that; --normal is the direction into it, in the base's axes")
-    if outcome.free_stroke and outcome.free_stroke["subtracted_N_per_m"]:
-        lines.append(
-            "the force in free motion changes by {:.3g} N/m (std {:.2g}), which was subtracted".format(
-                *outcome.free_stroke["slope_N_per_m"]
-            )
-        )
+    lines += subtraction_notes(outcome.free_stroke)
     lines += [f"trouble in {ticks} ticks: {trouble}" for trouble, ticks in outcome.troubles.items()]
     if outcome.force is not None:
         settled = (

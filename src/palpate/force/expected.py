@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, pi
+from math import inf, log, pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array
 from palpate.force.boundary import rank_one
+from palpate.force.ceiling import residual_travel
 from palpate.force.gains import Gains
 from palpate.force.lag import ultimate_gain
 from palpate.force.sampled_loop import SampledLoop, law_for
 from palpate.force.stiffness_bound import SHOWED
+from palpate.units import quantity
 
 LAGS, DECAYS, RISES, LEVELS = 8.0 + 0.5 * SHOWED, 4.0, 5.0, 3.0
 """Lags of the loop, B/K, times in which a surface rises out of the noise, and in which it comes to the level, that a
@@ -67,6 +69,69 @@ def level_time(gains: Gains, stiffness: float) -> float:
     return 2.0 * gains.level / (gains.arm.seen(stiffness) * gains.approach)
 
 
+BAND = 0.05
+"""Error over F_d within which a press counts as settled."""
+SOFT_TISSUE = 300.0
+"""Stiffness of soft foam and tissue [N/m], for which a press is predicted where nothing is known of the surface."""
+
+
+@dataclass(frozen=True)
+class PressTime:
+    """Time from the touch of a soft surface until the force stays within 5 %.
+
+    Args:
+        stiffness: K of the surface [N/m].
+        least: that any law with this F_max takes [s]; None without F_max.
+        usual: within which 99 % of first touches settle [s].
+        most: bound on a spring while K_u is at most the cap [s]: K_u stays that high where the surface rises so slowly
+            that it passes for a drift of the sensor, or has hidden something hard.
+    """
+
+    stiffness: float
+    least: float | None
+    usual: float
+    most: float
+
+    def __str__(self) -> str:
+        """Give the times in words, to be read after the F_max."""
+        usual, most = quantity(self.usual, "s"), quantity(self.most, "s")
+        least = (
+            ""
+            if self.least is None
+            else f"; no law with this F_max takes less than {quantity(self.least, 's')}"
+        )
+        surface = quantity(self.stiffness, "N/m")
+        return (
+            f"the press takes up to {usual} on {surface}, and up to {most} where that passes for a drift of the sensor,"
+            f" or hid something hard{least}"
+        )
+
+
+def press_time(gains: Gains, stiffness: float = SOFT_TISSUE) -> PressTime:
+    """Predict the time of a press on a soft surface without damping.
+
+    The speed is at least min(approach, g (F_d - F)) with the gain g at the cap, so that the force comes nearer in
+    proportion to the error at least. The lower bound is that of a speed of (F_max - F)/(K_eff Theta): no momentum.
+
+    Args:
+        gains: of the loop.
+        stiffness: K of the surface itself [N/m].
+    """
+    arm, felt = gains.arm, gains.arm.seen(stiffness)
+    force, limit = gains.force, gains.force_max
+    error = min(gains.approach / gains.gain, force)  # from which the gain decides, no more the approach
+    most = (
+        LAGS * gains.theta
+        + (force - error) / (felt * gains.approach)
+        + log(error / (BAND * force)) / (felt * gains.gain)
+    )
+    least = None
+    if limit is not None:
+        slowness = arm.seen(gains.cap) * residual_travel(arm) / felt
+        least = float(slowness * log(limit / (limit - (1.0 - BAND) * force)))
+    return PressTime(stiffness, least, settling_bound(gains, stiffness), float(most))
+
+
 def softest(gains: Gains) -> float:
     """The surface whose force rises by a standard deviation of the noise in a lag, at the approach's speed [N/m].
 
@@ -97,10 +162,6 @@ def stiffening(gains: Gains, step: Step, error: float, overshoot: float = OVERSH
     at = int(np.argmax(step.force > 1.0 - error))
     later = np.interp(step.time[at] + gains.theta, step.time, step.force)
     return float((overshoot + error) / (later - step.force[at]))
-
-
-BAND = 0.05
-"""Error over F_d within which a press counts as settled."""
 
 
 @dataclass(frozen=True)

@@ -70,7 +70,7 @@ def surface(stiffness: float, damping: float = 0.0, **others: float) -> Surface:
     """A surface at 0; `others` as `Surface` has them."""
     numbers: dict[str, float] = {
         "exponent": 1.0, "place": 0.0, "sway": 0.0, "frequency": 0.0, "later": stiffness, "change": 1e9, "depth": 0.0,
-        "mass": 0.0,
+        "mass": 0.0, "thickness": 1e9, "behind": 0.0, "cable": 0.0,
         **others,
     }  # fmt: skip
     return Surface(float(stiffness), float(damping), **{k: float(v) for k, v in numbers.items()})

@@ -29,6 +29,9 @@ class Surface(NamedTuple):
         change: time of that [s]; the force stays, what is in contact then being as deep as that takes.
         depth: of the surface's own deflection then [m].
         mass: M, of what moves with the tip [kg]; 0, or from 0.02 (the step is explicit) with an exponent of 1, at rest.
+        thickness: depth from which something hard lies behind a massless surface of exponent 1 [m].
+        behind: stiffness of that beside K [N/m].
+        cable: force in the reading over the way from the start, of a cable that lets go at the surface [N/m].
     """
 
     stiffness: float
@@ -41,6 +44,9 @@ class Surface(NamedTuple):
     change: float
     depth: float
     mass: float
+    thickness: float
+    behind: float
+    cable: float
 
 
 @part
@@ -111,6 +117,11 @@ def contact_of_position(world, surface, K, x, p, h):
         depth = max(p, 1e-9) ** (n - 1.0)
         k, b = K * depth, surface.damping * depth
     q = (world.stiffness * x + b / h * p) / (world.stiffness + k + b / h)
+    if q > surface.thickness:
+        hard = surface.behind
+        q = (world.stiffness * x + b / h * p + hard * surface.thickness) / (
+            world.stiffness + k + hard + b / h
+        )
     force = world.stiffness * (x - q)
     if force <= 0.0 or pressed <= 0.0:
         relaxed = p * b / (b + k * h) if b > 0.0 else 0.0
@@ -125,7 +136,8 @@ def contact_of_mass(surface, K, x, v):
         return 0.0
     n = surface.exponent
     depth = 1.0 if n == 1.0 else x ** (n - 1.0)
-    return max((K * x + surface.damping * v) * depth, 0.0)
+    behind = surface.behind * max(x - surface.thickness, 0.0)
+    return max((K * x + surface.damping * v) * depth + behind, 0.0)
 
 
 @law
@@ -213,9 +225,9 @@ def touch(world, surface, control, start, desired, noise, error, line, out):
             line[i] = line[i + 1]
         if world.delay > 0:
             line[world.delay - 1] = into
-        mean = 0.0
+        false, mean = error[k] + (surface.cable * (body.x - start) if body.x < 0.0 else 0.0), 0.0
         for j in range(world.steps):
-            body = moved(world, surface, body, held, (k * world.steps + j) * h, h, noise, 8 * k, error[k])
+            body = moved(world, surface, body, held, (k * world.steps + j) * h, h, noise, 8 * k, false)
             mean += body.force
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = (
             mean / world.steps,

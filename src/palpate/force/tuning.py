@@ -1,7 +1,6 @@
 """Tuning: gains from an arm and a surface, their predicted performance, and where they are proved."""
 
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import asdict, dataclass, field, replace
 from math import inf, isfinite
 from typing import Any
 
@@ -14,10 +13,13 @@ from palpate.force.certifying import certify, exact_interval
 from palpate.force.expected import (
     OVERSHOOT,
     RISES,
+    SOFT_TISSUE,
     STIFFENING_AT,
     Margins,
+    PressTime,
     Step,
     margins,
+    press_time,
     rise,
     settling_bound,
     softest,
@@ -27,7 +29,6 @@ from palpate.force.expected import (
 from palpate.force.gains import Gains, gains_for, known_lag
 from palpate.force.known_surface import Known
 from palpate.force.lag import MIN_STIFFNESS, sum_of_lags
-from palpate.force.peak import peak_bound
 from palpate.records import Result
 
 RIGID = 1e9
@@ -74,11 +75,6 @@ class Tuning(Result):
             peak = max(peak, gains.approach * float(np.sqrt(gains.cap * inner.mass)))
         return peak
 
-    @cached_property
-    def peak_bound(self) -> float | None:
-        """Bound of the first peak [N] while K_u is not below the stiffness; None for a torque arm."""
-        return peak_bound(self.gains)
-
     def surface_stiffness(self, kind: str) -> tuple[float, float] | None:
         """The proved interval of K + B/theta of the surface itself for a kind of claim [N/m]."""
         for claim in self.certificate.claims:
@@ -99,8 +95,13 @@ class Tuning(Result):
 
     @property
     def softest(self) -> float:
-        """The softest surface that is known of [N/m]."""
-        return _softest(self.known, self.gains.cap)
+        """The softest surface that is known of, or a soft tissue [N/m]."""
+        return min(self.known.stiffness[0] if self.known else SOFT_TISSUE, self.gains.cap)
+
+    @property
+    def soft_press(self) -> PressTime:
+        """Time of a press on the softest surface."""
+        return press_time(self.gains, self.softest)
 
     @property
     def exact(self) -> tuple[float, float]:
@@ -147,8 +148,8 @@ class Tuning(Result):
             "speed_m_s": gains.speed,
             "force_max": gains.force_max,
             "price_s": None if self.price is None else self.price[0],
+            "soft_press": asdict(self.soft_press),
             "peak_N": self.peak,
-            "peak_bound_N": self.peak_bound,
             "settling_s": _number(max(step.settling for step in self.steps)),
             "overshoot": self.overshoot,
             "margins": {

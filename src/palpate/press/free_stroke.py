@@ -5,6 +5,7 @@ proportion to the position is subtracted from the readings of the press; another
 only on the way to the surface cannot be seen from here.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import sqrt
 from typing import Any, NamedTuple
@@ -78,14 +79,12 @@ class FreeForce:
         length: of the stroke [m].
         slope: change of the force with the position [N/m], and its standard deviation.
         bend: coefficient of the square of the position [N/m^2], and its standard deviation.
-        inertia: mass by which the force follows the acceleration [kg], and its standard deviation.
         rest: standard deviation of what else changes from part to part of the stroke [N].
     """
 
     length: float
     slope: tuple[float, float]
     bend: tuple[float, float]
-    inertia: tuple[float, float]
     rest: float
 
     def slope_to_subtract(self, travel: float, level: float) -> float:
@@ -123,11 +122,10 @@ class FreeForce:
         return slope
 
     def to_json(self, subtracted: float) -> dict[str, Any]:
-        """Length, slope, inertia and the slope that is subtracted, as plain JSON values."""
+        """Length, slope and the slope that is subtracted, as plain JSON values."""
         return {
             "length_m": self.length,
             "slope_N_per_m": self.slope,
-            "inertia_kg": self.inertia,
             "subtracted_N_per_m": subtracted,
         }
 
@@ -155,7 +153,9 @@ def make_stroke(arm: MovableArm, plan: StrokePlan) -> FreeForce:
 
 
 def fit_free_force(rows: Array, length: float) -> FreeForce:
-    """Fit the force over position, its square, speed, acceleration and time.
+    """Fit the force over the position and its square; speed, acceleration and time are fitted beside them.
+
+    The acceleration takes the tool's inertia out of the slope; the press moves too evenly to show it.
 
     Args:
         rows: time [s], position along the normal [m] and force along the normal [N], shape (n, 3).
@@ -171,7 +171,15 @@ def fit_free_force(rows: Array, length: float) -> FreeForce:
     bend = values[5], stds[5]
     if abs(bend[0]) <= SLOPE_SIGNIFICANCE * bend[1]:
         values, stds, rest = _least_squares(columns[:, :5], f)
-    return FreeForce(length, (values[4], stds[4]), bend, (values[3], stds[3]), rest)
+    return FreeForce(length, (values[4], stds[4]), bend, rest)
+
+
+def subtraction_notes(stroke: Mapping[str, Any] | None) -> list[str]:
+    """Name the slope that a stroke, as `FreeForce.to_json` has it, took off the readings of the press, if any."""
+    if not stroke or not stroke["subtracted_N_per_m"]:
+        return []
+    text = "the force in free motion changes by {:.3g} N/m (std {:.2g}), which was subtracted"
+    return [text.format(*stroke["slope_N_per_m"])]
 
 
 def _least_squares(columns: Array, f: Array) -> tuple[list[float], list[float], float]:

@@ -9,6 +9,7 @@ import numpy as np
 from palpate.arrays import Array, Indices
 from palpate.bench.summary import CONTACT
 from palpate.files import write_text
+from palpate.press.free_stroke import subtraction_notes
 from palpate.press.setting import Place
 from palpate.press.summary import PressRequest
 from palpate.records import Record
@@ -154,7 +155,8 @@ def _further_notes(summary: dict[str, Any]) -> list[str]:
     of_tool = [note["text"] for note in identified.get("warnings", ()) if note["code"] == "tool-inertia"]
     if identified.get("why_not"):
         of_tool.append(f"Nothing was identified: {identified['why_not']}")
-    return [*remarks, *(f"{text[0].upper()}{text[1:]}." for text in (*of_tool, *summary["notes"]))]
+    texts = (*of_tool, *subtraction_notes(summary["free_stroke"]), *summary["notes"])
+    return [*remarks, *(f"{text[0].upper()}{text[1:]}." for text in texts)]
 
 
 def tables(summary: dict[str, Any]) -> list[Table]:

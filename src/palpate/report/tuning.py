@@ -35,7 +35,7 @@ def rows(tuning: Tuning) -> list[tuple[str, str]]:
         ("stiffest surface", f"{gains.cap:.4g} N/m (K + B/theta)"),
         ("gain on it", f"{1e3 * gains.gain:.4g} mm/s per N"),
         ("approach", f"at most {1e3 * gains.approach:.3g} mm/s"),
-        ("peak at touch", _peak(tuning)),
+        ("peak at touch", f"{tuning.peak:.4g} N predicted (no bound)"),
         ("F_max", _force_max(tuning)),
         ("settling", f"{slowest:.3g} s with known stiffness" if isfinite(slowest) else "-"),
         ("overshoot", f"{100 * tuning.overshoot:.2g} % with known stiffness"),
@@ -75,16 +75,10 @@ def _force_max(tuning: Tuning) -> str:
     gains, price = tuning.gains, tuning.price
     if price is None:
         return "none: a hard surface behind a soft layer is met at the arm's speed (--force-max bounds the force)"
-    later = f"it takes {price[0]:.2g} s longer on {quantity(price[1], 'N/m')}"
-    speed = f"{1e3 * gains.speed:.3g} mm/s"
-    return f"at most {gains.force_max:g} N if something hard lies behind, by at most {speed}; {later}"
-
-
-def _peak(tuning: Tuning) -> str:
-    bound = tuning.peak_bound
-    if bound is None:
-        return f"{tuning.peak:.4g} N predicted (no bound)"
-    return f"{tuning.peak:.4g} N predicted; at most {bound:.4g} N for K_u >= K, without noise and damping"
+    cost = f"{1e3 * gains.speed:.3g} mm/s, which costs {price[0]:.2g} s"
+    return (
+        f"at most {gains.force_max:g} N if something hard lies behind, by at most {cost}; {tuning.soft_press}"
+    )
 
 
 def build_answer(
@@ -135,12 +129,9 @@ def lines(tuning: Tuning, written: Sequence[object] = ()) -> Iterator[Text]:
     mark = Text("✓ proved stable", "green") if tuning.proved else Text("✕ nothing could be proved", "red")
     yield Text(printable(f"{title}   "), "bold").append(mark).append(printable(places))
     slowest = _slowest(tuning)
-    bound = (
-        "" if tuning.peak_bound is None else f" (proved below {quantity(tuning.peak_bound, 'N')} on springs)"
-    )
     touch = [
         f"at most {quantity(gains.approach, 'm')}/s",
-        f"peak {quantity(tuning.peak, 'N')}{bound}",
+        f"peak {quantity(tuning.peak, 'N')}",
         f"settles in {slowest:.2g} s" if isfinite(slowest) else "does not settle",
         f"overshoot {100 * tuning.overshoot:.2g} %",
     ]
@@ -193,13 +184,12 @@ def page(tuning: Tuning, command: str = "palpate.force.tune(...).report(...)") -
 
 def tuning_sentence(tuning: Tuning) -> str:
     """The proof, the peak of a first touch, and its settling in words."""
-    bound, slowest = tuning.peak_bound, _slowest(tuning)
+    slowest = _slowest(tuning)
     proved = "Proved stable." if tuning.proved else "Nothing is proved."
     peak = f"The first touch peaks at {quantity(tuning.peak, 'N')}"
-    below = f", by proof below {quantity(bound, 'N')} on springs" if bound is not None else ""
     settles = f", and settles within {quantity(slowest, 's')}" if isfinite(slowest) else ""
     layers = f" F_max: {_force_max(tuning)}." if tuning.price is not None else ""
-    return f"{proved} {peak}{below}{settles}.{layers}"
+    return f"{proved} {peak}{settles}.{layers}"
 
 
 def _slowest(tuning: Tuning) -> float:
@@ -255,14 +245,13 @@ def draw(tuning: Tuning) -> Figure:
 
 
 def touch_chart(tuning: Tuning) -> Chart:
-    """The force after the touch on the softest and on the stiffest surface, and the proved bound of its peak."""
-    force, bound = tuning.gains.force, tuning.peak_bound
+    """The force after the touch on the softest and on the stiffest surface."""
+    force = tuning.gains.force
     looks = zip(tuning.steps, ("softest", "stiffest"), ("measured", "F"), strict=True)
     longest = max(step.settling if isfinite(step.settling) else 0.0 for step in tuning.steps)
     bands = [
         Band(force, force, label="desired", **KNOWN),
         Band(force * (1.0 - BAND), force * (1.0 + BAND), "measured"),
-        *([] if bound is None else [Band(bound, bound, "ink", "proved: below", 1.6)]),
     ]
     return Chart(
         "force [N]",
@@ -270,7 +259,7 @@ def touch_chart(tuning: Tuning) -> Chart:
         bands,
         x="time from the touch [s]",
         xlim=(0.0, max(2.5 * longest, 0.1)),
-        ylim=(0.0, 1.15 * max(bound or 0.0, tuning.peak)),
+        ylim=(0.0, 1.15 * tuning.peak),
         height=2.9,
     )
 
