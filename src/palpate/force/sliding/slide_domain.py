@@ -16,7 +16,8 @@ from palpate.force.sliding.touches import ACROSS, LIGHT, safe_height, slope_of_t
 LIMITS = {"lag": 0.02, "turning": 0.01, "sticking": 0.08, "tilt": 0.07}
 """Largest terms of the domain; measured by benchmarks/force/sliding.py."""
 SETTLING = 10.0
-"""Lags of the loop until a light press is held: 3 for which it has to stay, and three decays of 1/alpha."""
+"""Lags of the loop until a light press is held: 3 for which it has to stay, and three decays of 1/alpha.
+No slide of benchmarks/judge/slide_judge.py begins later than the time that follows."""
 LAG_ERROR, CURVATURE_AGE = 5e-3, 0.01
 """Lag that is not known, and age of the curvature where it is used [s]."""
 
@@ -83,20 +84,18 @@ def start_time(gains: Gains) -> float:
     slide = numbers_of(gains)
     low, _ = slide_domain(gains) or (gains.cap, gains.cap)
     depth = LIGHT * gains.force / gains.arm.seen(low)
-    press = depth / gains.approach + SETTLING * gains.theta
+    settling = SETTLING * gains.theta
     if slide.touches == 0.0:
-        return press
+        return depth / gains.approach + settling
     after_touches = _slope(gains, gains.arm.seen(low))
     tilts = (
         (slide.slope, slide.touches),
         (slide.slope, ACROSS * slide.touches),
         (after_touches, slide.touches),
     )
-    down = sum(
-        float(safe_height(1.0 / slide.radius, tilt, way)) + 2.0 * tilt * way + depth for tilt, way in tilts
-    )
+    down = sum(float(safe_height(1.0 / slide.radius, tilt, way)) + 2.0 * tilt * way for tilt, way in tilts)
     across = sqrt(6.0 * (slide.touches + depth) / slide.acceleration) + 2.0 * lead_of(gains)
-    return 4.0 * press + 3.0 * across + down / gains.approach
+    return 4.0 * settling + 3.0 * across + (depth + down) / gains.approach
 
 
 def edge_speed(gains: Gains, stiffness: float) -> float:
