@@ -15,7 +15,7 @@ from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
 from palpate.force.sliding import slide_state as places
 from palpate.force.sliding.paths import directions
-from palpate.force.sliding.slide_domain import edge_speed, slide_domain, slide_terms
+from palpate.force.sliding.slide_domain import edge_speed, slide_domain, slide_terms, start_time
 from palpate.force.sliding.slide_law import slide_from, stiffness_in
 from palpate.force.sliding.tangent_filter import (
     COVARIANCE,
@@ -155,6 +155,9 @@ def test_three_touches_measure_the_normal_before_the_slide(arm: str, shape: str)
     assert len(touches) == 4
     assert rows[:first, 0].max() < 1.1 * gains.force
     assert rows[: touches[3], 0].max() < 0.5 * gains.force
+    assert 0.3 < (first - touches[0]) * gains.arm.tick / start_time(gains) < 1.0
+    lateral = np.linalg.norm(np.diff(rows[:first, 1:4], axis=0), axis=1) / gains.arm.tick
+    assert lateral.max() > 2.0 * gains.approach
 
 
 def test_a_sensor_that_is_not_tared_holds_the_tip_between_touches() -> None:

@@ -58,7 +58,7 @@ def summarise(
         "arm": gains.arm.title, "mode": gains.arm.kind, "slide": slide_json(gains), "troubles": troubles,
         "end": INTERRUPTED if interrupted else "held" if figures.obeys else "not held" if figures.touched else never,
         "truth": {"friction": ground.friction, "stiffness": felt_stiffness},
-        **dict.fromkeys(("force", "normal", "friction", "stiffness", "tool")), "path_m": 0.0,
+        **dict.fromkeys(("force", "normal", "friction", "stiffness", "tool", "began_s")), "path_m": 0.0,
     }  # fmt: skip
     if not figures.touched:
         return summary
@@ -76,6 +76,7 @@ def summarise(
         },
         "friction": {"value": float(mu), "ci95": list(mu.ci95)},
         "stiffness": {"value": float(K), "ci95": list(K.ci95)},
+        "began_s": gains.arm.tick * float(np.argmax(on) - np.argmax(c["normal_force"] > 0.0)),
         "path_m": float(np.linalg.norm(np.diff(where, axis=0), axis=1).sum()),
         "contact_lost": figures.lost,
         "tool": {
@@ -166,13 +167,14 @@ def _cards(summary: dict[str, Any]) -> list[Card]:
     off = f"median error {n['median_error_deg']:.2g}\N{DEGREE SIGN}"
     error, largest = f"{100 * f['rms_share']:.2g}", f"largest {100 * f['largest_share']:.2g} %, after 0.5 s"
     true = quantity(truth["stiffness"], "N/m") + ", with the arm in series" * (summary["mode"] == "position")
+    began = f"the slide began {summary['began_s']:.2g} s after the first one"
     tool = [
         Card("Tool", f"{t['median_angle_deg']:.2g}", "\N{DEGREE SIGN}", why=f"95 %: {t['angle95_deg']:.2g}")
         for t in [summary["tool"]]
         if t
     ]
     return [
-        Card("Contact", "lost" if lost else "kept", tone="fail" if lost else "ok"),
+        Card("Contact", "lost" if lost else "kept", tone="fail" if lost else "ok", why=began),
         Card("Force error", error, "% rms", why=largest),
         Card("Normal", _normal(n), why=off),
         *tool,

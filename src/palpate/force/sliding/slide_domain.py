@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Any
 
 from palpate.errors import InputError
+from palpate.force.ceiling import force_ceiling
 from palpate.force.gains import Gains
 from palpate.force.lag import sum_of_lags
 from palpate.force.slide_table import Slide
 from palpate.force.sliding.slide_law import EXCESS
-from palpate.force.sliding.touches import slope_of_touches
+from palpate.force.sliding.touches import ACROSS, LIGHT, safe_height, slope_of_touches
 
 LIMITS = {"lag": 0.02, "turning": 0.01, "sticking": 0.08, "tilt": 0.07}
 """Largest terms of the domain; measured by benchmarks/force/sliding.py."""
+SETTLING = 10.0
+"""Lags of the loop until a light press is held: 3 for which it has to stay, and three decays of 1/alpha.
+No slide of benchmarks/judge/slide_judge.py begins later than the time that follows."""
 LAG_ERROR, CURVATURE_AGE = 5e-3, 0.01
 """Lag that is not known, and age of the curvature where it is used [s]."""
 
@@ -63,6 +68,36 @@ def lead_of(gains: Gains) -> float:
     return gains.theta if gains.arm.kind == "servo" else sum_of_lags(gains.arm)
 
 
+def crossing_speed(gains: Gains) -> float:
+    """Speed from a touch to the next [m/s]: the arm's, but a surface in the way stays below the force limit."""
+    ceiling = force_ceiling(gains.arm, gains.force, gains.force_limit, gains.cap, gains.theta)
+    return max(min(gains.speed, ceiling), gains.approach)
+
+
+def start_time(gains: Gains) -> float:
+    """Time from the first contact until the slide begins, at most [s].
+
+    For the softest surface of the domain, which falls away from each touch by two standard deviations of its tilt. A
+    way L with the acceleration a up and a/2 down takes sqrt(6 L/a). A press takes the approach to its light force and
+    `SETTLING` lags of the loop.
+    """
+    slide = numbers_of(gains)
+    low, _ = slide_domain(gains) or (gains.cap, gains.cap)
+    depth = LIGHT * gains.force / gains.arm.seen(low)
+    settling = SETTLING * gains.theta
+    if slide.touches == 0.0:
+        return depth / gains.approach + settling
+    after_touches = _slope(gains, gains.arm.seen(low))
+    tilts = (
+        (slide.slope, slide.touches),
+        (slide.slope, ACROSS * slide.touches),
+        (after_touches, slide.touches),
+    )
+    down = sum(float(safe_height(1.0 / slide.radius, tilt, way)) + 2.0 * tilt * way for tilt, way in tilts)
+    across = sqrt(6.0 * (slide.touches + depth) / slide.acceleration) + 2.0 * lead_of(gains)
+    return 4.0 * settling + 3.0 * across + (depth + down) / gains.approach
+
+
 def edge_speed(gains: Gains, stiffness: float) -> float:
     """Largest speed at which a step that was not expected costs half of F_d at most on a surface K [m/s].
 
@@ -101,7 +136,7 @@ def slide_json(gains: Gains) -> dict[str, Any]:
     return {
         "speed_m_s": slide.speed, "mu_max": slide.mu_max, "slope_std_rad": slide.slope, "radius_m": slide.radius,
         "floor_of_force": (1.0 + slide.mu_max**2) ** 0.5, "domain": {"stiffness": list(domain) if domain else None},
-        "edge_speed_m_s": edge_speed(gains, gains.cap),
+        "edge_speed_m_s": edge_speed(gains, gains.cap), "start_s": start_time(gains),
     }  # fmt: skip
 
 
@@ -113,6 +148,7 @@ def slide_sentence(gains: Gains) -> str:
         f"at {1e3 * slide.speed:.3g} mm/s, on radii from {1e3 * slide.radius:.3g} mm, with friction up to "
     )
     floor = (
+        f"it begins within {start_time(gains):.2g} s of the first contact; "
         f"on springs no normal, right or wrong, presses harder than {(1.0 + slide.mu_max**2) ** 0.5:.3g} times the "
         "force at rest: a surface that stiffens, or a sensor's bias, adds to that; "
         f"a step costs half the force at most up to {1e3 * edge_speed(gains, gains.cap):.2g} mm/s on "

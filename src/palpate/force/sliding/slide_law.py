@@ -67,6 +67,7 @@ from palpate.force.sliding.slide_state import (
     TROUBLE,
     UNCHANGED,
     VELOCITY,
+    accelerate,
     beside,
     cross,
     followed_tip,
@@ -100,7 +101,7 @@ from palpate.force.sliding.tangent_filter import (
     turn,
     variance,
 )  # fmt: skip
-from palpate.force.sliding.touches import enter_touch, next_touch
+from palpate.force.sliding.touches import LIGHT, enter_touch, next_touch
 from palpate.force.stage import LOCKED
 
 CONE = 0.07
@@ -122,8 +123,6 @@ EXCESS = 0.3
 CROOKED = 0.4
 """Cosine between force and direction below which a press is in other axes: friction of 0.9 and a tilt of 20 degrees
 have 0.48."""
-LIGHT = 0.3
-"""Share of F_d with which a normal is touched."""
 HALF = 0.5
 """Share of the speed after a step, and where the force is off."""
 RECOVERY = 0.5
@@ -221,10 +220,12 @@ def press_tick(law, s, late, desired, force, position, missed):
     if size > 0.5 * desired and force @ n < CROOKED * size:
         s[TROUBLE] = FRAMES
         return ZERO3
-    if press.stage.phase == LOCKED and size > 0.5 * desired and guard.trouble == FINE:
-        stiffness, sd = stiffness_in(c, press)
+    stiffness, sd = stiffness_in(c, press)
+    over = press.watch.mean - press.watch.rest - desired
+    # a touch is where its force is F_d: that place is known once K adds less to its error than the noise does
+    known = s[TOUCHES] < ALL and press.bound.sure.stiffness > 0.0 and abs(over) * sd < c.noise * stiffness
+    if (known or press.stage.phase == LOCKED) and size > 0.5 * desired and guard.trouble == FINE:
         if s[TOUCHES] < ALL:
-            over = press.watch.mean - press.watch.rest - desired
             put_vector(s, PACE, ZERO3)
             enter_touch(law, s, late - over / (stiffness + 2.0 * sd) * n, c.noise / stiffness)
             return ZERO3
@@ -376,10 +377,7 @@ def along_surface(law, s, desired, direction):
         if stiffness * law.step > EXCESS * desired:
             sure = min(sure, EXCESS * desired / (stiffness * law.lead))
         wanted = min(law.speed * min(asked, 1.0) * s[SLOW], sure) * unit(flat, e1)
-    v = v - (v @ ahead) * ahead
-    change = wanted - v
-    size, most = sqrt(change @ change), law.acceleration * c.tick
-    return v + min(most / size, 1.0) * change if size > 0.0 else v
+    return accelerate(law, v - (v @ ahead) * ahead, wanted)
 
 
 @law

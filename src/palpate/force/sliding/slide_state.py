@@ -68,6 +68,7 @@ class Sliding(NamedTuple):
         doubt: standard deviation of the lag [s].
         step: highest step that is expected in the surface [m].
         spacing: between three touches that measure the normal before the slide; 0 for none [m].
+        crossing: speed from a touch to the next, at which a surface in the way stays below the force limit [m/s].
     """
 
     press: Cautious
@@ -85,6 +86,7 @@ class Sliding(NamedTuple):
     doubt: float
     step: float
     spacing: float
+    crossing: float
 
     def start(self, s):
         """In free motion, knowing nothing but a direction into the surface: fills a state, shape (SIZE,)."""
@@ -135,6 +137,14 @@ def put_vector(s, at, v):
 def within(v, most):
     """Whether each component is a number and at most so large."""
     return abs(v.x) <= most and abs(v.y) <= most and abs(v.z) <= most
+
+
+@law
+def accelerate(law, v, wanted):
+    """The velocity after a tick towards a wanted one, within the acceleration of the tip [m/s]."""
+    change = wanted - v
+    size, most = sqrt(change @ change), law.acceleration * law.press.tick
+    return v + min(most / size, 1.0) * change if size > 0.0 else v
 
 
 @law

@@ -18,7 +18,7 @@ from palpate.force.force_loop import PressingLoop, check_speed
 from palpate.force.gains import Gains, load_gains
 from palpate.force.guard import flatten
 from palpate.force.sliding import slide_state as places
-from palpate.force.sliding.slide_domain import lead_of, numbers_of
+from palpate.force.sliding.slide_domain import crossing_speed, lead_of, numbers_of
 from palpate.force.sliding.slide_law import slide_step
 from palpate.force.sliding.slide_state import SIZE, SLIDING_TROUBLES, Sliding, put_vector, vector_at
 from palpate.force.sliding.tangent_filter import BASE, G1, G2, MU, STATES, STIFF, variance
@@ -57,6 +57,7 @@ def sliding(gains: Gains, into: ArrayLike = DOWN) -> Sliding:
         ratio=slide.ratio, turning=slide.radius**-3, curvature=1.0 / slide.radius, speed=slide.speed,
         acceleration=slide.acceleration, lead=lead_of(gains), late=min(0.5 * arm.rate / arm.sensor.sampling, 1.0),
         encoder=ENCODER_STD, doubt=LAG_STD, step=slide.step, spacing=slide.touches,
+        crossing=crossing_speed(gains),
     )  # fmt: skip
 
 
