@@ -16,6 +16,7 @@ from palpate.identification.free_motion import (
     find_free_motion,
     find_moving_mass,
 )
+from palpate.identification.leak import Leak, remove_leak
 from palpate.identification.options import DEFAULT_OPTIONS, Options, lag_prior
 from palpate.identification.ripple import Ripple, find_ripple
 from palpate.identification.sampling import Channels, thinned
@@ -63,6 +64,7 @@ class Contacts:
         drift: of the force, removed as straight lines; None if the log shows none.
         press: at constant speed, of a log that has little else; None for another log.
         ripple: of the force, removed as a sine; None if free motion shows none.
+        leak: of the force sensor, removed; None if free motion shows none.
     """
 
     spans: tuple[tuple[int, int], ...]
@@ -78,6 +80,7 @@ class Contacts:
     drift: Drift | None = None
     press: SteadyPress | None = None
     ripple: Ripple | None = None
+    leak: Leak | None = None
 
 
 def contacts_of(channels: Channels, options: Options = DEFAULT_OPTIONS) -> tuple[Channels, Chain, Contacts]:
@@ -91,6 +94,9 @@ def contacts_of(channels: Channels, options: Options = DEFAULT_OPTIONS) -> tuple
         raise InputError(
             f"the cut-off must be at most {2 * highest:.4g} Hz, a quarter of the readings per second, got {cutoff:g}"
         )
+    leak = None
+    if not options.bonded:
+        channels, leak = remove_leak(channels)
     chain = Chain(cutoff or highest, channels.dt)
     strokes = find_strokes(channels)
     drift = None
@@ -109,14 +115,15 @@ def contacts_of(channels: Channels, options: Options = DEFAULT_OPTIONS) -> tuple
             candidate = _whole_log_in_contact(channels, channels.force, channels.position, options, strokes)
         lag = lag_prior(options.lag, options.lag_std, 1 / channels.rate, 0.0, None)
         signs = candidate.position_sign, candidate.force_sign
-        press = steady_press(channels, strokes, signs, candidate.resting, lag, drift)
+        press = steady_press(channels, strokes, signs, candidate.resting, lag, drift, leak)
         if press is None or press.headline.stiffness.value <= 0:
             strokes = ()
             press = None
             contacts = _find_contacts(channels, chain, free_motion, options, strokes)
         else:
             contacts = candidate
-    contacts = replace(contacts, drift=drift, press=press, ripple=ripple)
+    removed = {"drift": drift, "press": press, "ripple": ripple, "leak": leak}
+    contacts = replace(contacts, **removed)
     if not contacts.spans:
         return channels, chain, contacts
     begin, end = max(contacts.spans, key=lambda span: span[1] - span[0])
@@ -131,10 +138,7 @@ def contacts_of(channels: Channels, options: Options = DEFAULT_OPTIONS) -> tuple
     thinned_channels = thinned(channels, min(block, len(channels.force) // _MIN_ROWS))
     narrow = Chain(chosen, thinned_channels.dt)
     thinned_contacts = replace(
-        _find_contacts(thinned_channels, narrow, free_motion, options, strokes),
-        drift=drift,
-        press=press,
-        ripple=ripple,
+        _find_contacts(thinned_channels, narrow, free_motion, options, strokes), **removed
     )
     return (
         (thinned_channels, narrow, thinned_contacts)

@@ -22,12 +22,14 @@ from numpy.polynomial import chebyshev
 from palpate.arrays import Array
 from palpate.identification.free_motion import Drift
 from palpate.identification.least_squares import estimate_noise
+from palpate.identification.leak import Leak
 from palpate.identification.options import Lag
 from palpate.identification.pooling import random_effects
 from palpate.identification.sampling import Channels
 from palpate.identification.strokes import MAX_BLOCKS, MIN_STROKE_REACH, Stroke, find_turns
 from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import block_means
+from palpate.signals.types import NORMAL
 
 WINDOW = (0.35, 0.97)
 """Force range, as fractions of the peak, over which the tangent is fitted; below it the contact area still grows."""
@@ -166,7 +168,11 @@ class Curve:
 
 
 def stroke_curves(
-    channels: Channels, strokes: Sequence[Stroke], signs: tuple[float, float], drift: Drift | None
+    channels: Channels,
+    strokes: Sequence[Stroke],
+    signs: tuple[float, float],
+    drift: Drift | None,
+    leak: Leak | None,
 ) -> list[Curve]:
     """The force of each stroke over its depth."""
     curves = []
@@ -180,6 +186,8 @@ def stroke_curves(
         removed_drift = np.zeros(len(time))
         if drift is not None:
             removed_drift = np.interp(time - channels.start, drift.times, drift.levels)
+        if leak is not None:
+            removed_drift += NORMAL * leak.column(time)
         readings = min(channels.rate * channels.dt, 1.0)
         depth = signs[0] * channels.position[valid_rows]
         curves.append(Curve(time, depth, force, removed_drift, end > begin, readings))
@@ -292,6 +300,7 @@ def steady_press(
     rest: float,
     lag: Lag,
     drift: Drift | None = None,
+    leak: Leak | None = None,
 ) -> SteadyPress | None:
     """The press of a log's strokes; None where the force does not follow them.
 
@@ -299,7 +308,7 @@ def steady_press(
     logged, less a drift of the force; `signs` multiply position and force, and `rest` is the force out of contact after
     its sign [N].
     """
-    all_curves = stroke_curves(channels, strokes, signs, drift)
+    all_curves = stroke_curves(channels, strokes, signs, drift, leak)
     largest_span = max((curve.span for curve in all_curves), default=0.0)
     curves = [curve for curve in all_curves if curve.span > largest_span / 2]
     loadings = [curve for curve in curves if curve.loads]
