@@ -7,7 +7,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.causes import BRIEF_CONTACT, Code, Warn
-from palpate.identification.filters import MAX_CUTOFF_RATIO, Chain, choose_cutoff
+from palpate.identification.filters import MAX_CUTOFF_RATIO, MIN_SPECTRUM_SAMPLES, Chain, choose_cutoff
 from palpate.identification.free_motion import (
     MAX_SLOPE_RATIO,
     Drift,
@@ -42,6 +42,8 @@ _MIN_SIGN_CORRELATION = 0.6
 """Least correlation of block means of force and position that shows their signs."""
 _STROKE_MARGIN = 0.05
 """Fraction of a stroke's duration added before and after it, in which the probe speeds up or slows down."""
+_LOADED = 0.9
+"""Fraction of the peak force at which a loading is over, and a hold may follow."""
 _SAMPLES_PER_PERIOD = 16.0
 """Samples in a period of the cut-off after thinning: means of more readings lose 0.6 % there, in both channels."""
 
@@ -132,6 +134,9 @@ def contacts_of(channels: Channels, options: Options = DEFAULT_OPTIONS) -> tuple
     )  # its rise and fall, too
     contact_signals = channels.position[surroundings], channels.force[surroundings]
     chosen = cutoff or choose_cutoff(*contact_signals, channels.dt, channels.rate)
+    force = contacts.force_sign * channels.force[begin:end] - contacts.resting
+    if cutoff is None and np.argmax(force > _LOADED * force.max()) < MIN_SPECTRUM_SAMPLES:
+        return channels, chain, contacts  # a loading that is over in fewer rows than show how fast it is
     if chosen > 0.9 * highest:
         return channels, chain, contacts
     block = int(1 / (_SAMPLES_PER_PERIOD * chosen * channels.dt))

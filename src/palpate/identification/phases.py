@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from palpate.arrays import Array, Mask
-from palpate.identification.causes import Code, Warn
+from palpate.arrays import Array
 from palpate.identification.sampling import Channels
 from palpate.signals.samples import block_means, outer_range, robust_std
 
@@ -19,7 +18,10 @@ _MIN_STDS = 7.0
 """Standard deviations of the steps of the whole log from which on a step is none of its noise."""
 _DEEP_FRACTION, _SLOW_FRACTION = 0.5, 0.1
 """Fraction of the position's range beyond which a probe is deep, and of the highest speed there below which it rests."""
-_MIN_ROWS = 20
+_MIN_ROWS = 8
+"""Blocks that a level of the force needs."""
+_MIN_ROWS_BEFORE = 40
+"""Rows before a break that are identified."""
 
 
 class Break(NamedTuple):
@@ -27,7 +29,7 @@ class Break(NamedTuple):
 
     Args:
         time: on the log's clock [s].
-        before, after: force counted from its level at the begin of the log [N].
+        before, after: force before and after, counted from its level at the begin of the log [N].
     """
 
     time: float
@@ -37,8 +39,8 @@ class Break(NamedTuple):
     @property
     def text(self) -> str:
         """The break as a sentence."""
-        fall = f"the force falls at once from {self.before:.3g} to {self.after:.3g} N while the probe moves on"
-        return f"at {self.time:.4g} s {fall}: the specimen breaks, or slips; what follows is left out"
+        fall = f"the force falls at once by {1 - self.after / self.before:.0%} while the probe moves on"
+        return f"At {self.time:.4g} s {fall}: the specimen breaks or slips, and what follows is left out"
 
 
 def find_break(channels: Channels, tolerance: float) -> Break | None:
@@ -59,7 +61,11 @@ def find_break(channels: Channels, tolerance: float) -> Break | None:
     lost = before - after
     slowed = np.clip(1 - speed_after / np.maximum(speed_before, 1e-300), 0.0, 1.0)
     unexplained = lost - np.maximum(slowed * before, _MIN_STDS * robust_std(lost))
-    breaks = (speed_before > 0) & (speed_after > 0) & (unexplained > 0) & (lost > tolerance * before)
+    place_before, place_after = _sides(position)
+    advances = (speed_before > 0) & (speed_after > 0) & (place_after > place_before)
+    loaded = np.roll(before, _SIDE + _GAP) > before / 2  # a tap is over at once as well
+    breaks = advances & loaded & (unexplained > 0) & (lost > tolerance * before)
+    breaks[: _MIN_ROWS_BEFORE // size + 1] = False
     if not breaks.any():
         return None
     first = int(np.argmax(breaks))
@@ -75,34 +81,25 @@ def _sides(values: Array) -> tuple[Array, Array]:
     return means[:-distance], means[distance:]
 
 
-def flows(channels: Channels) -> Warn | None:
-    """A warning if the force is there while the probe advances, and gone while it rests as deep; else None."""
+def flows(channels: Channels) -> bool:
+    """True if the force is there while the probe advances, and gone wherever it rests as deep."""
     size = -(-len(channels.force) // _BLOCKS)
     force, position = block_means(channels.force, size), block_means(channels.position, size)
-    speed = np.gradient(position)
+    return any(_is_gone_at_rest(force, direction * position) for direction in (1.0, -1.0))
+
+
+def _is_gone_at_rest(force: Array, position: Array) -> bool:
+    """True if a surface at higher positions has no force at rest beyond the noise and what a slow speed makes."""
     low, high = outer_range(position)
-    for direction in (1.0, -1.0):
-        depth = (position - (low if direction > 0 else high)) * direction / max(high - low, 1e-300)
-        deep, free = depth > _DEEP_FRACTION, depth < _DEEP_FRACTION / 2
-        fastest = float(np.percentile(np.abs(speed[deep]), 98)) if deep.any() else 0.0
-        advances = deep & (direction * speed > _DEEP_FRACTION * fastest)
-        rests = deep & (np.abs(speed) < _SLOW_FRACTION * fastest)
-        if min(map(np.count_nonzero, (advances, rests, free))) >= _MIN_ROWS and _is_gone(
-            force, speed, advances, rests, free
-        ):
-            return Warn(
-                Code.FORCE_FLOWS,
-                "the force follows the speed, and is gone where the probe rests deep in the contact: what is touched"
-                " flows, and has no stiffness",
-            )
-    return None
-
-
-def _is_gone(force: Array, speed: Array, advances: Mask, rests: Mask, free: Mask) -> bool:
-    """True if the force of some blocks at rest is none beyond the noise and what their slow speed makes."""
+    depth, speed = (position - low) / max(high - low, 1e-300), np.gradient(position)
+    deep, free = depth > _DEEP_FRACTION, depth < _DEEP_FRACTION / 2
+    fastest = float(np.percentile(np.abs(speed[deep]), 98)) if deep.any() else 0.0
+    advances = deep & (speed > _DEEP_FRACTION * fastest)
+    rests = deep & (np.abs(speed) < _SLOW_FRACTION * fastest)
+    if min(map(np.count_nonzero, (advances, rests, free))) < _MIN_ROWS:
+        return False
     level = float(np.median(force[free]))
     noise = robust_std(force[free] - level)
     moving = abs(float(np.median(force[advances])) - level)
-    resting = np.abs(force[rests] - level)
-    slow = float(np.mean(np.abs(speed[rests]))) / float(np.mean(np.abs(speed[advances])))
-    return moving > _MIN_STDS * noise and float(np.median(resting)) < 2 * slow * moving + noise
+    resting = float(np.percentile(np.abs(force[rests] - level), 90))
+    return moving > _MIN_STDS * noise and resting < 2 * _SLOW_FRACTION * moving + 3 * noise

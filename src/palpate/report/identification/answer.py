@@ -75,6 +75,8 @@ _SHOWN_OTHERWISE = {
     Code.LOW_EXCITATION,
     Code.SERIES_COMPLIANCE,
     Code.NO_CONTACT,
+    Code.FORCE_DROPS,
+    Code.FORCE_FLOWS,
 }
 
 
@@ -143,6 +145,9 @@ def lines(result: Identification, name: str, notes: Sequence[str] = ()) -> Itera
     """The lines, with their styles."""
     for text in words.unit_warnings(result):
         yield Text(printable(f"! {text}"), style="bold yellow")
+    for warn in result.warnings:
+        if warn.code is Code.FORCE_DROPS:
+            yield Text(printable(f"! {warn.text}."), style="bold yellow")
     point = result.working_point
     if result.slide is not None:
         yield Text(printable(f"{name}: {result.slide.sentence}"), style="bold")
@@ -176,6 +181,10 @@ def _without_point(result: Identification, name: str) -> Iterator[Text]:
         yield Text(printable(f"{title}."), style="bold")
         if title.startswith(words.UNTOUCHED.partition("in")[0]):
             yield Text(words.ADVICE[Code.NO_CONTACT])
+        return
+    if Code.FORCE_FLOWS.word in result.codes:
+        yield Text(printable(f"{name}: {words.FLOWS}"), style="bold")
+        yield from _rows(result)
         return
     lacking = "no stiffness without a model" if result.identified else "no stiffness"
     text = f"{name} shows {lacking}: no stretch in contact is long enough."
