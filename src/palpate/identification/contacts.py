@@ -124,32 +124,34 @@ def contacts_of(channels: Channels, options: Options = DEFAULT_OPTIONS) -> tuple
             contacts = _find_contacts(channels, chain, free_motion, options, strokes)
         else:
             contacts = candidate
-    removed = {"drift": drift, "press": press, "ripple": ripple, "leak": leak}
-    contacts = replace(contacts, **removed)
-    if not contacts.spans:
-        return channels, chain, contacts
-    begin, end = max(contacts.spans, key=lambda span: span[1] - span[0])
-    surroundings = slice(
-        max(begin - (end - begin) // 2, 0), end + (end - begin) // 2
-    )  # its rise and fall, too
-    contact_signals = channels.position[surroundings], channels.force[surroundings]
-    chosen = cutoff or choose_cutoff(*contact_signals, channels.dt, channels.rate)
-    force = contacts.force_sign * channels.force[begin:end] - contacts.resting
-    if cutoff is None and np.argmax(force > _LOADED * force.max()) < MIN_SPECTRUM_SAMPLES:
-        return channels, chain, contacts  # a loading that is over in fewer rows than show how fast it is
-    if chosen > 0.9 * highest:
+    contacts = replace(contacts, drift=drift, press=press, ripple=ripple, leak=leak)
+    chosen = cutoff or _cutoff_of_longest(channels, contacts)
+    if not contacts.spans or chosen > 0.9 * highest:
         return channels, chain, contacts
     block = int(1 / (_SAMPLES_PER_PERIOD * chosen * channels.dt))
     thinned_channels = thinned(channels, min(block, len(channels.force) // _MIN_ROWS))
     narrow = Chain(chosen, thinned_channels.dt)
-    thinned_contacts = replace(
-        _find_contacts(thinned_channels, narrow, free_motion, options, strokes), **removed
-    )
-    return (
-        (thinned_channels, narrow, thinned_contacts)
-        if thinned_contacts.spans
-        else (channels, chain, contacts)
-    )
+    again = _find_contacts(thinned_channels, narrow, free_motion, options, strokes)
+    again = replace(again, drift=drift, press=press, ripple=ripple, leak=leak)
+    return (thinned_channels, narrow, again) if again.spans else (channels, chain, contacts)
+
+
+def _cutoff_of_longest(channels: Channels, contacts: Contacts) -> float:
+    """Cut-off that the longest contact needs, its rise and fall included [Hz]; infinite if none narrows it.
+
+    A creep test rises at once, and then holds for minutes: a loading that is over in fewer rows than show how fast it
+    is needs the widest filter.
+    """
+    begin, end = max(contacts.spans, key=lambda span: span[1] - span[0], default=(0, 0))
+    if begin == end:
+        return np.inf
+    load = contacts.force_sign * channels.force[begin:end] - contacts.resting
+    peak = float(np.percentile(load, 98))
+    first = int(np.argmax(load > _LOADED * peak))
+    if first < MIN_SPECTRUM_SAMPLES and np.percentile(load[first:], 5) > peak / 2:
+        return np.inf
+    rows = slice(max(begin - (end - begin) // 2, 0), end + (end - begin) // 2)
+    return choose_cutoff(channels.position[rows], channels.force[rows], channels.dt, channels.rate)
 
 
 def _without_ripple(

@@ -61,8 +61,8 @@ def remove_leak(channels: Channels) -> tuple[Channels, Leak | None]:
     """The channels less a leak of the force sensor that free motion shows, with a warning; as they are without one."""
     size = -(-len(channels.force) // _MAX_ROWS)
     force, position = block_means(channels.force, size), block_means(channels.position, size)
-    time = size * channels.dt * np.arange(len(force))
-    integral = np.cumsum(force - force.mean()) * size * channels.dt
+    time: Array = size * channels.dt * np.arange(len(force), dtype=np.float64)
+    integral: Array = np.cumsum(force - force.mean()) * size * channels.dt
     fits = []
     for direction in (1.0, -1.0):
         low, high = outer_range(direction * position)
@@ -94,7 +94,9 @@ def _fit(force: Array, time: Array, integral: Array, stays: list[slice]) -> _Fit
     noise = estimate_noise(residual, rows, 3)
     effective = min(noise.effective, len(rows))
     cov = noise.variance * len(rows) / effective * np.linalg.pinv(leak.T @ leak)
-    gain = effective * np.log(float(other @ other) / max(float(residual @ residual), 1e-300)) + np.log(effective)
+    gain = effective * np.log(float(other @ other) / max(float(residual @ residual), 1e-300)) + np.log(
+        effective
+    )
     fit = _Fit(theta, np.asarray(cov, np.float64), float(gain))
     certain = theta[2] < -_MIN_STDS * np.sqrt(cov[2, 2])
     return fit if certain and gain > 0 else None

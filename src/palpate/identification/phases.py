@@ -17,7 +17,7 @@ _SIDE, _GAP = 4, 3
 _MIN_STDS = 7.0
 """Standard deviations of the steps of the whole log from which on a step is none of its noise."""
 _DEEP_FRACTION, _SLOW_FRACTION = 0.5, 0.1
-"""Fraction of the position's range beyond which a probe is deep, and of the highest speed there below which it rests."""
+"""Fraction of the position's range beyond which a probe is deep; of the highest speed there below which it rests."""
 _MIN_ROWS = 8
 """Blocks that a level of the force needs."""
 _MIN_ROWS_BEFORE = 40

@@ -21,8 +21,8 @@ from numpy.polynomial import chebyshev
 
 from palpate.arrays import Array
 from palpate.identification.free_motion import Drift
-from palpate.identification.least_squares import estimate_noise
 from palpate.identification.leak import Leak
+from palpate.identification.least_squares import estimate_noise
 from palpate.identification.options import Lag
 from palpate.identification.pooling import random_effects
 from palpate.identification.sampling import Channels

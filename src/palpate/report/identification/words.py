@@ -75,15 +75,15 @@ FLOWS = "What is touched flows: its force follows the speed and is gone at rest,
 def sentence(result: Identification) -> str:
     """A break, the stiffness, its place, its largest cause of uncertainty, the next step; of a slide its friction."""
     breaks = [f"{warn.text}." for warn in result.warnings if warn.code is Code.FORCE_DROPS]
-    return " ".join([*breaks, _sentence_of_contact(result)])
+    if result.slide is not None:
+        answer = result.slide.sentence
+    else:
+        answer = FLOWS if Code.FORCE_FLOWS.word in result.codes else _sentence_of_contact(result)
+    return " ".join([*breaks, answer])
 
 
 def _sentence_of_contact(result: Identification) -> str:
-    """The answer without a break."""
-    if result.slide is not None:
-        return result.slide.sentence
-    if Code.FORCE_FLOWS.word in result.codes:
-        return FLOWS
+    """The stiffness of a contact, or why there is none."""
     if not result.contacts:
         return f"{no_contact_in('this log', result)}."
     point = result.working_point
