@@ -176,8 +176,8 @@ def _excludes(K: Parameter, parameters: dict[str, Parameter], point: WorkingPoin
         return False
     highest = {name: max((p.ci95 or (0.0, 0.0))[1], 0.0) for name, p in parameters.items()}
     inertia = (2 * np.pi * point.frequency_Hz) ** 2 * highest.get("M", 0.0) * (point.source == "octave")
-    low, high = min(slope.ci95[0], *point.each), max(slope.ci95[1], *point.each)
-    return bool(K.ci95[0] > high + inertia or low > K.ci95[1] + highest.get("K1", 0.0))
+    ends = *slope.ci95, *point.each
+    return bool(K.ci95[0] > max(ends) + inertia or min(ends) > K.ci95[1] + highest.get("K1", 0.0))
 
 
 def _reject_negative(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Parameter]:
