@@ -16,8 +16,8 @@ from palpate.identification.free_motion import (
     find_free_motion,
     find_moving_mass,
 )
-from palpate.identification.leak import Leak, remove_leak
 from palpate.identification.options import DEFAULT_OPTIONS, Options, lag_prior
+from palpate.identification.phases import Leak, remove_leak
 from palpate.identification.ripple import Ripple, find_ripple
 from palpate.identification.sampling import Channels, thinned
 from palpate.identification.steady_press import SteadyPress, steady_press

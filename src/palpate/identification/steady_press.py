@@ -21,9 +21,9 @@ from numpy.polynomial import chebyshev
 
 from palpate.arrays import Array
 from palpate.identification.free_motion import Drift
-from palpate.identification.leak import Leak
 from palpate.identification.least_squares import estimate_noise
 from palpate.identification.options import Lag
+from palpate.identification.phases import Leak
 from palpate.identification.pooling import random_effects
 from palpate.identification.sampling import Channels
 from palpate.identification.strokes import MAX_BLOCKS, MIN_STROKE_REACH, Stroke, find_turns

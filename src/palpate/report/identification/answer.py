@@ -16,8 +16,7 @@ from palpate.identification.result import Identification
 from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.report.identification import page as pages
 from palpate.report.identification import words
-from palpate.report.identification.page import facts, parameter_table
-from palpate.report.identification.uncertainty_budget import budget_notes, budget_tables
+from palpate.report.identification.page import budget_notes, budget_tables, facts, parameter_table
 from palpate.report.page import Answer
 from palpate.report.terminal import show_table
 from palpate.signals.types import NORMAL
