@@ -1,4 +1,4 @@
-"""What a force does with time: a sensor that leaks, a specimen that breaks, a fluid, a creep test."""
+"""Changes of a force with time: a sensor that leaks, a specimen that breaks, a fluid, a creep test."""
 
 from __future__ import annotations
 

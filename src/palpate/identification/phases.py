@@ -1,4 +1,4 @@
-"""What a force does with time that no model of a surface describes: a leak of the sensor, a break, a flow.
+"""Changes of a force with time that no model of a surface describes: a leak of the sensor, a break, a flow.
 
 A charge amplifier, or a coupling that blocks a constant force, reads r with r' = f' - r / T, so the force is f = r +
 (1 / T) times the integral of r. In free motion f is zero: what is read there follows from the contacts before, and
@@ -141,7 +141,7 @@ class Leak:
 
 
 @dataclass(frozen=True)
-class _Fit:
+class _LeakFit:
     """The force in free motion as an offset, a straight drift and a leak.
 
     Args:
@@ -178,7 +178,7 @@ def remove_leak(channels: Channels) -> tuple[Channels, Leak | None]:
     return _without(channels, fit, channels.start + time, integral)
 
 
-def _fit(force: Array, time: Array, integral: Array, stays: list[slice]) -> _Fit | None:
+def _fit(force: Array, time: Array, integral: Array, stays: list[slice]) -> _LeakFit | None:
     """Fit some stays; None unless the leak is certain, and explains the force better than a drift that bends."""
     if not stays or stays[-1].stop - stays[0].start <= sum(rows.stop - rows.start for rows in stays):
         return None  # no contact lies between them
@@ -194,7 +194,7 @@ def _fit(force: Array, time: Array, integral: Array, stays: list[slice]) -> _Fit
     gain = effective * np.log(float(other @ other) / max(float(residual @ residual), 1e-300)) + np.log(
         effective
     )
-    fit = _Fit(theta, np.asarray(cov, np.float64), float(gain))
+    fit = _LeakFit(theta, np.asarray(cov, np.float64), float(gain))
     certain = theta[2] < -_MIN_RATE_STDS * np.sqrt(cov[2, 2])
     return fit if certain and gain > 0 else None
 
@@ -214,7 +214,7 @@ def _is_free(force: Array, position: Array, direction: float, limit: float) -> b
     return float(np.ptp(free_motion.levels)) <= free_motion.noise
 
 
-def _without(channels: Channels, fit: _Fit, time: Array, integral: Array) -> tuple[Channels, Leak]:
+def _without(channels: Channels, fit: _LeakFit, time: Array, integral: Array) -> tuple[Channels, Leak]:
     removed = fit.theta[1] * (time - channels.start) + fit.theta[2] * integral
     raw = channels.raw
     raw_time = raw.start + raw.dt * np.arange(len(raw.held_force), dtype=np.float64)
