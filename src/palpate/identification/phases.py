@@ -73,6 +73,9 @@ def find_break(channels: Channels, tolerance: float) -> Break | None:
     place_before, place_after = _sides(position)
     advances = (speed_before > 0) & (speed_after > 0) & (place_after > place_before)
     loaded = np.roll(before, _SIDE + _GAP) > before / 2  # a tap is over at once as well
+    loaded &= (before > tolerance * force.max()) & (
+        lost < (1 + tolerance) * before
+    )  # a bounce goes below none
     breaks = advances & loaded & (unexplained > 0) & (lost > tolerance * before)
     breaks[: _MIN_ROWS_BEFORE // size + 1] = False
     if not breaks.any():
