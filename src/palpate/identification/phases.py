@@ -125,6 +125,9 @@ _MIN_STAY_ROWS = 8
 _MIN_RATE_STDS = 5.0
 """Standard errors of the rate from which on the sensor leaks: wrong once in a million."""
 
+_DECAY_STDS = 3.0
+"""Standard errors of a decay within the stays from which on it is seen, and to which it agrees with the leak."""
+
 
 @dataclass(frozen=True)
 class Leak:
@@ -199,7 +202,27 @@ def _fit(force: Array, time: Array, integral: Array, stays: list[slice]) -> _Lea
     )
     fit = _LeakFit(theta, np.asarray(cov, np.float64), float(gain))
     certain = theta[2] < -_MIN_RATE_STDS * np.sqrt(cov[2, 2])
-    return fit if certain and gain > 0 else None
+    return fit if certain and gain > 0 and _decays(force[rows], leak, stays, fit) else None
+
+
+def _decays(force: Array, leak: Array, stays: list[slice], fit: _LeakFit) -> bool:
+    """True if the force within the stays decays at the rate of the leak, whatever lies between their levels.
+
+    An adhesive or plastic surface shifts the level from one stay to the next as a leak does, but at rest it stays there.
+    """
+    lengths = [stay.stop - stay.start for stay in stays]
+    own_levels = np.repeat(np.eye(len(stays)), lengths, axis=0)
+    columns = np.column_stack([leak[:, 1:], own_levels])
+    theta, residual = _solve(columns, force)
+    noise = estimate_noise(residual, np.arange(len(force)), columns.shape[1])
+    variance = (
+        noise.variance
+        * len(force)
+        / min(noise.effective, len(force))
+        * np.linalg.pinv(columns.T @ columns)[1, 1]
+    )
+    rate, std = theta[1], float(np.sqrt(variance))
+    return bool(rate < -_DECAY_STDS * std and abs(rate - fit.theta[2]) < _DECAY_STDS * std)
 
 
 def _solve(columns: Array, force: Array) -> tuple[Array, Array]:
