@@ -3,8 +3,7 @@
 import pytest
 
 from palpate.report.identification.answer import build_answer
-from palpate.report.identification.page import page
-from palpate.report.identification.uncertainty_budget import budget_notes, budget_tables
+from palpate.report.identification.page import budget_notes, budget_tables, page
 from palpate.report.identification.words import Source
 from palpate.report.terminal import answer_text
 from report.outcomes import OUTCOMES

@@ -29,6 +29,11 @@ _CAUSES = {
         "drift, friction or relaxation beside the model",
         "let the log begin and end in free motion, and press more often",
     ),
+    "time": Cause(
+        "a change of the force with time, which one press cannot tell from the surface",
+        "press more often",
+        "A",
+    ),
     "loadings": Cause("differences between loadings", "press more often, at one speed", "A"),
     "friction": Cause("friction, or play before the position's sensor", "press and measure without play"),
     "ripple": Cause("the ripple of the force", "remove its cause: mains, vibration, interference"),
@@ -36,10 +41,6 @@ _CAUSES = {
     "octaves": Cause("the difference between frequencies", "excite a wider band (palpate excite)", "A"),
     "blocks": Cause("differences between parts of the log", "press longer, or more often, at one depth", "A"),
     "repetition": Cause("differences between parts of the log", "press more often", "A"),
-    "dynamic stiffness": Cause(
-        "the difference between the model and the dynamic stiffness",
-        "keep the motion near one frequency and depth",
-    ),
     "unexplained": Cause("a force that the model does not explain", "keep the motion near one depth"),
     "missing force": Cause(
         "a mass below zero", "compensate the tool's inertia, or measure nearer to the surface"
@@ -124,6 +125,12 @@ class Code(Enum):
     COLUMNS_SWAPPED = "A column was given a role that its own name contradicts."
     LINES_SKIPPED = "Lines of the file that are not rows of its table were left out."
     FORCE_DRIFTS = "The force in free motion changes during the log; the change is removed."
+    FORCE_DROPS = (
+        "The force drops at once while the probe moves on: a break, or a slip; the log is read up to it."
+    )
+    FORCE_FLOWS = (
+        "The force follows the speed and is gone at rest: what is touched flows, and has no stiffness."
+    )
     FORCE_RIPPLES = "The force in free motion ripples; the ripple is removed, and what may be left counts."
     FORCE_SIGN_REVERSED = "The force falls as the probe goes in; its sign was reversed."
     POSITION_SIGN_REVERSED = "The position falls as the probe goes in; its sign was reversed."

@@ -7,7 +7,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.causes import BRIEF_CONTACT, Code, Warn
-from palpate.identification.filters import MAX_CUTOFF_RATIO, Chain, choose_cutoff
+from palpate.identification.filters import MAX_CUTOFF_RATIO, MIN_SPECTRUM_SAMPLES, Chain, choose_cutoff
 from palpate.identification.free_motion import (
     MAX_SLOPE_RATIO,
     Drift,
@@ -17,6 +17,7 @@ from palpate.identification.free_motion import (
     find_moving_mass,
 )
 from palpate.identification.options import DEFAULT_OPTIONS, Options, lag_prior
+from palpate.identification.phases import Leak, remove_leak
 from palpate.identification.ripple import Ripple, find_ripple
 from palpate.identification.sampling import Channels, thinned
 from palpate.identification.steady_press import SteadyPress, steady_press
@@ -41,6 +42,8 @@ _MIN_SIGN_CORRELATION = 0.6
 """Least correlation of block means of force and position that shows their signs."""
 _STROKE_MARGIN = 0.05
 """Fraction of a stroke's duration added before and after it, in which the probe speeds up or slows down."""
+_LOADED = 0.9
+"""Fraction of the peak force at which a loading is over, and a hold may follow."""
 _SAMPLES_PER_PERIOD = 16.0
 """Samples in a period of the cut-off after thinning: means of more readings lose 0.6 % there, in both channels."""
 
@@ -63,6 +66,7 @@ class Contacts:
         drift: of the force, removed as straight lines; None if the log shows none.
         press: at constant speed, of a log that has little else; None for another log.
         ripple: of the force, removed as a sine; None if free motion shows none.
+        leak: of the force sensor, removed; None if free motion shows none.
     """
 
     spans: tuple[tuple[int, int], ...]
@@ -78,6 +82,7 @@ class Contacts:
     drift: Drift | None = None
     press: SteadyPress | None = None
     ripple: Ripple | None = None
+    leak: Leak | None = None
 
 
 def contacts_of(channels: Channels, options: Options = DEFAULT_OPTIONS) -> tuple[Channels, Chain, Contacts]:
@@ -91,6 +96,9 @@ def contacts_of(channels: Channels, options: Options = DEFAULT_OPTIONS) -> tuple
         raise InputError(
             f"the cut-off must be at most {2 * highest:.4g} Hz, a quarter of the readings per second, got {cutoff:g}"
         )
+    leak = None
+    if not options.bonded:
+        channels, leak = remove_leak(channels)
     chain = Chain(cutoff or highest, channels.dt)
     strokes = find_strokes(channels)
     drift = None
@@ -109,38 +117,41 @@ def contacts_of(channels: Channels, options: Options = DEFAULT_OPTIONS) -> tuple
             candidate = _whole_log_in_contact(channels, channels.force, channels.position, options, strokes)
         lag = lag_prior(options.lag, options.lag_std, 1 / channels.rate, 0.0, None)
         signs = candidate.position_sign, candidate.force_sign
-        press = steady_press(channels, strokes, signs, candidate.resting, lag, drift)
+        press = steady_press(channels, strokes, signs, candidate.resting, lag, drift, leak)
         if press is None or press.headline.stiffness.value <= 0:
             strokes = ()
             press = None
             contacts = _find_contacts(channels, chain, free_motion, options, strokes)
         else:
             contacts = candidate
-    contacts = replace(contacts, drift=drift, press=press, ripple=ripple)
-    if not contacts.spans:
-        return channels, chain, contacts
-    begin, end = max(contacts.spans, key=lambda span: span[1] - span[0])
-    surroundings = slice(
-        max(begin - (end - begin) // 2, 0), end + (end - begin) // 2
-    )  # its rise and fall, too
-    contact_signals = channels.position[surroundings], channels.force[surroundings]
-    chosen = cutoff or choose_cutoff(*contact_signals, channels.dt, channels.rate)
-    if chosen > 0.9 * highest:
+    contacts = replace(contacts, drift=drift, press=press, ripple=ripple, leak=leak)
+    chosen = cutoff or _cutoff_of_longest(channels, contacts)
+    if not contacts.spans or chosen > 0.9 * highest:
         return channels, chain, contacts
     block = int(1 / (_SAMPLES_PER_PERIOD * chosen * channels.dt))
     thinned_channels = thinned(channels, min(block, len(channels.force) // _MIN_ROWS))
     narrow = Chain(chosen, thinned_channels.dt)
-    thinned_contacts = replace(
-        _find_contacts(thinned_channels, narrow, free_motion, options, strokes),
-        drift=drift,
-        press=press,
-        ripple=ripple,
-    )
-    return (
-        (thinned_channels, narrow, thinned_contacts)
-        if thinned_contacts.spans
-        else (channels, chain, contacts)
-    )
+    again = _find_contacts(thinned_channels, narrow, free_motion, options, strokes)
+    again = replace(again, drift=drift, press=press, ripple=ripple, leak=leak)
+    return (thinned_channels, narrow, again) if again.spans else (channels, chain, contacts)
+
+
+def _cutoff_of_longest(channels: Channels, contacts: Contacts) -> float:
+    """Cut-off that the longest contact needs, its rise and fall included [Hz]; infinite if none narrows it.
+
+    A creep test rises at once, and then holds for minutes: a loading that is over in fewer rows than show how fast it
+    is needs the widest filter.
+    """
+    begin, end = max(contacts.spans, key=lambda span: span[1] - span[0], default=(0, 0))
+    if begin == end:
+        return np.inf
+    load = contacts.force_sign * channels.force[begin:end] - contacts.resting
+    peak = float(np.percentile(load, 98))
+    first = int(np.argmax(load > _LOADED * peak))
+    if first < MIN_SPECTRUM_SAMPLES and np.percentile(load[first:], 5) > peak / 2:
+        return np.inf
+    rows = slice(max(begin - (end - begin) // 2, 0), end + (end - begin) // 2)
+    return choose_cutoff(channels.position[rows], channels.force[rows], channels.dt, channels.rate)
 
 
 def _without_ripple(

@@ -358,10 +358,12 @@ def _moved_by_lag(
 
 
 def _removed_columns(problem: Problem, lag: float) -> dict[str, Array]:
-    """Remains that a removed drift or ripple may leave, each of standard deviation 1, by name."""
-    drift, ripple = problem.contacts.drift, problem.contacts.ripple
+    """Remains that a removed drift, leak or ripple may leave, each of standard deviation 1, by name."""
+    drift, ripple, leak = problem.contacts.drift, problem.contacts.ripple, problem.contacts.leak
     modes = drift.bends(problem.time).T if drift is not None else ()
     columns = {f"drift {i}": column for i, column in enumerate(modes)}
+    if leak is not None:
+        columns["leak"] = leak.column(problem.time)
     if ripple is not None:
         waves = ripple.std * ripple.columns(problem.time, problem.motion.moved(0, lag))
         columns |= {f"ripple {i}": column for i, column in enumerate(waves)}

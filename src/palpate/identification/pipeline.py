@@ -11,6 +11,7 @@ from palpate.identification.filters import Chain
 from palpate.identification.in_series import SeriesSpring
 from palpate.identification.linearisation import lag_open
 from palpate.identification.options import LAG, Options
+from palpate.identification.phases import find_break, flows
 from palpate.identification.press import gather_evidence
 from palpate.identification.problem import Problem, build_problem, thin_rows
 from palpate.identification.result import Identification, LagFound, Press, Traces, WorkingPoint
@@ -65,7 +66,7 @@ def identify(record: Record, **given: Any) -> Identification:
     """
     options = Options.of(**given)
     units = record.units
-    channels = channels_of(record)
+    channels = _until_break(record, options)
     options.check_lag(len(channels.position) * channels.dt)
     channels = thinned(channels, -(-len(channels.position) // _MAX_SAMPLES))
     channels, chain, contacts = contacts_of(channels, options)
@@ -85,11 +86,23 @@ def identify(record: Record, **given: Any) -> Identification:
     return _outcome(log, choice, warnings)
 
 
+def _until_break(record: Record, options: Options) -> Channels:
+    """The channels up to the first break of the specimen, with a warning; all of them without one, or of a fluid."""
+    channels = channels_of(record)
+    first = find_break(channels, options.tolerance)
+    if first is None or flows(channels):
+        return channels
+    before = record["time"] < first.time
+    channels = channels_of(replace(record, columns={name: record[name][before] for name in record.columns}))
+    return replace(channels, warnings=(*channels.warnings, Warn(Code.FORCE_DROPS, first.text)))
+
+
 _MIN_STIFFNESS, _MAX_STIFFNESS = 1.0, 1e8
 _MAX_DEPTH = 0.5
 """Reach of half an arm [m]: no press goes deeper, and one of half a mm that is read in m does."""
 _MAX_TRACE_SAMPLES = 50_000
 """Samples of each trace: what is more is thinned, and averaged where it was fitted."""
+_FLOWS = "the force follows the speed, and is gone where the probe rests: what is touched flows"
 _MEASURED_LAG_RATIO = 0.5
 """Share of the prior's half-width at which a lag is measured: the log tells three times as much, 1/.5^2 - 1."""
 
@@ -104,6 +117,9 @@ def _outcome(log: _PreparedLog, choice: Choice, warnings: tuple[Warn, ...]) -> I
         press = replace(press, pull_off=_pull_off(log.channels, problem.contacts))
     choice = _surface_alone(choice, options)
     parameters, parameter_warnings = verdicts(choice, point, options, log.units)
+    if flows(log.channels):
+        point, press, parameter_warnings = None, None, (Warn(Code.FORCE_FLOWS, _FLOWS),)
+        parameters |= {"K": parameters["K"].without_number(_FLOWS)}
     warnings = (*warnings, *parameter_warnings)
     fitted = choice.answer
     mass = parameters.get("M")

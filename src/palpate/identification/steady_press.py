@@ -23,11 +23,13 @@ from palpate.arrays import Array
 from palpate.identification.free_motion import Drift
 from palpate.identification.least_squares import estimate_noise
 from palpate.identification.options import Lag
+from palpate.identification.phases import Leak
 from palpate.identification.pooling import random_effects
 from palpate.identification.sampling import Channels
 from palpate.identification.strokes import MAX_BLOCKS, MIN_STROKE_REACH, Stroke, find_turns
 from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import block_means
+from palpate.signals.types import NORMAL
 
 WINDOW = (0.35, 0.97)
 """Force range, as fractions of the peak, over which the tangent is fitted; below it the contact area still grows."""
@@ -166,7 +168,11 @@ class Curve:
 
 
 def stroke_curves(
-    channels: Channels, strokes: Sequence[Stroke], signs: tuple[float, float], drift: Drift | None
+    channels: Channels,
+    strokes: Sequence[Stroke],
+    signs: tuple[float, float],
+    drift: Drift | None,
+    leak: Leak | None,
 ) -> list[Curve]:
     """The force of each stroke over its depth."""
     curves = []
@@ -180,6 +186,8 @@ def stroke_curves(
         removed_drift = np.zeros(len(time))
         if drift is not None:
             removed_drift = np.interp(time - channels.start, drift.times, drift.levels)
+        if leak is not None:
+            removed_drift += NORMAL * leak.column(time)
         readings = min(channels.rate * channels.dt, 1.0)
         depth = signs[0] * channels.position[valid_rows]
         curves.append(Curve(time, depth, force, removed_drift, end > begin, readings))
@@ -292,6 +300,7 @@ def steady_press(
     rest: float,
     lag: Lag,
     drift: Drift | None = None,
+    leak: Leak | None = None,
 ) -> SteadyPress | None:
     """The press of a log's strokes; None where the force does not follow them.
 
@@ -299,7 +308,7 @@ def steady_press(
     logged, less a drift of the force; `signs` multiply position and force, and `rest` is the force out of contact after
     its sign [N].
     """
-    all_curves = stroke_curves(channels, strokes, signs, drift)
+    all_curves = stroke_curves(channels, strokes, signs, drift, leak)
     largest_span = max((curve.span for curve in all_curves), default=0.0)
     curves = [curve for curve in all_curves if curve.span > largest_span / 2]
     loadings = [curve for curve in curves if curve.loads]
@@ -319,6 +328,7 @@ def steady_press(
         headline = headline.spread_as(slopes_at(similar, WINDOW, lag, rest))
     if not headline.stiffness.with_cause("repetition", Contribution(0.0)).known_to(1.0):
         return None
+    headline = _against_return(headline, loadings, curves, rest)
     windows = [(level - HALF_WINDOW, min(level + HALF_WINDOW, 1.0)) for level in LEVELS]
     others = [slopes_at(loadings, window, lag, rest) for window in windows]
     known = tuple(slopes for slopes in others if slopes and slopes.stiffness.known_to(1.0))
@@ -328,6 +338,28 @@ def steady_press(
         longest = max(of_direction, key=lambda curve: curve.span, default=None)
         drawn_curves.append(np.stack([longest.depth, longest.force]) if longest else np.empty((2, 0)))
     return SteadyPress(headline, known, *map(thin_curve, drawn_curves))
+
+
+def _against_return(
+    headline: Slopes, loadings: Sequence[Curve], curves: Sequence[Curve], rest: float
+) -> Slopes:
+    """The slope of some loadings, with the difference from the returns' slope at that force as a cause.
+
+    A return goes over the same positions at other times: the force of a surface is the same there, that of a breath, of
+    a warming sensor or of a relaxation is not. One press cannot tell them; the mean of n presses has a root of n less.
+    """
+    low = max(curve.reach[0] for curve in loadings)
+    high = min(curve.reach[1] for curve in loadings)
+    ends = [low + share * (high - low) for share in WINDOW]
+    windows = [curve.between(*ends) for curve in curves if curve.loads is not loadings[0].loads]
+    tangents = [window.tangent(headline.force + rest) for window in windows if window is not None]
+    if not tangents:
+        return headline
+    slope, variance, *_ = np.mean(tangents, axis=0)
+    stiffness = headline.stiffness
+    excess = (slope - stiffness.value) ** 2 - stiffness.half**2 - NORMAL**2 * variance
+    half = float(np.sqrt(max(excess, 0.0) / len(loadings)))
+    return replace(headline, stiffness=stiffness.with_cause("time", Contribution.within(half)))
 
 
 def thin_curve(curve: Array) -> Array:

@@ -16,8 +16,7 @@ from palpate.identification.result import Identification
 from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.report.identification import page as pages
 from palpate.report.identification import words
-from palpate.report.identification.page import facts, parameter_table
-from palpate.report.identification.uncertainty_budget import budget_notes, budget_tables
+from palpate.report.identification.page import budget_notes, budget_tables, facts, parameter_table
 from palpate.report.page import Answer
 from palpate.report.terminal import show_table
 from palpate.signals.types import NORMAL
@@ -75,6 +74,8 @@ _SHOWN_OTHERWISE = {
     Code.LOW_EXCITATION,
     Code.SERIES_COMPLIANCE,
     Code.NO_CONTACT,
+    Code.FORCE_DROPS,
+    Code.FORCE_FLOWS,
 }
 
 
@@ -143,6 +144,9 @@ def lines(result: Identification, name: str, notes: Sequence[str] = ()) -> Itera
     """The lines, with their styles."""
     for text in words.unit_warnings(result):
         yield Text(printable(f"! {text}"), style="bold yellow")
+    for warn in result.warnings:
+        if warn.code is Code.FORCE_DROPS:
+            yield Text(printable(f"! {warn.text}."), style="bold yellow")
     point = result.working_point
     if result.slide is not None:
         yield Text(printable(f"{name}: {result.slide.sentence}"), style="bold")
@@ -176,6 +180,10 @@ def _without_point(result: Identification, name: str) -> Iterator[Text]:
         yield Text(printable(f"{title}."), style="bold")
         if title.startswith(words.UNTOUCHED.partition("in")[0]):
             yield Text(words.ADVICE[Code.NO_CONTACT])
+        return
+    if Code.FORCE_FLOWS.word in result.codes:
+        yield Text(printable(f"{name}: {words.FLOWS}"), style="bold")
+        yield from _rows(result)
         return
     lacking = "no stiffness without a model" if result.identified else "no stiffness"
     text = f"{name} shows {lacking}: no stretch in contact is long enough."

@@ -47,6 +47,8 @@ ADVICE = {
     Code.SIGNALS_GUESSED: "Identify again by the printed command, with the right columns, units and axes.",
     Code.UNIT_DOUBTFUL: "Correct the unit; or name the column by its number, if its name is wrong.",
     Code.FORCE_DRIFTS: "Let the sensor warm up and tare it; it is removed as far as the log shows it.",
+    Code.FORCE_DROPS: "None, if it breaks; to identify what is left, give --start.",
+    Code.FORCE_FLOWS: "Press at other speeds for its damping; a fluid has no stiffness.",
     Code.FORCE_RIPPLES: "Remove its cause, such as mains, vibration or interference; or record more free motion.",
     Code.TOOL_INERTIA: "None, if the tool moves beyond the sensor; below zero: correct its compensation.",
     Code.FORCE_SIGN_REVERSED: "None, if the column is the right one.",
@@ -67,12 +69,21 @@ ADVICE = {
 """The remedy of a warning."""
 
 UNTOUCHED = "Nothing is touched in this log"
+FLOWS = "What is touched flows: its force follows the speed and is gone at rest, so it has no stiffness."
 
 
 def sentence(result: Identification) -> str:
-    """The stiffness, its place, its largest cause of uncertainty, and the next step; of a slide its friction."""
+    """A break, the stiffness, its place, its largest cause of uncertainty, the next step; of a slide its friction."""
+    breaks = [f"{warn.text}." for warn in result.warnings if warn.code is Code.FORCE_DROPS]
     if result.slide is not None:
-        return result.slide.sentence
+        answer = result.slide.sentence
+    else:
+        answer = FLOWS if Code.FORCE_FLOWS.word in result.codes else _sentence_of_contact(result)
+    return " ".join([*breaks, answer])
+
+
+def _sentence_of_contact(result: Identification) -> str:
+    """The stiffness of a contact, or why there is none."""
     if not result.contacts:
         return f"{no_contact_in('this log', result)}."
     point = result.working_point
