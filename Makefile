@@ -1,6 +1,6 @@
 # A machine with Python >= 3.11 (with venv) and make is enough. `make` alone lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long test-real-time test-all lint format check bench live attack soak figures figures-fast trust claims answers docs pictures lock clean
+.PHONY: help demo test test-long test-real-time test-all lint format check bench live attack figures figures-fast trust claims answers docs pictures lock clean
 
 BIN := .venv/bin
 OUT := runs/foam-hybrid
@@ -69,9 +69,6 @@ live: .venv/dev.stamp ## measure the live page in headless Chromium: frames a se
 attack: .venv/dev.stamp ## 10,000 hostile inputs, faults of the disk, kills, an hour of each experiment, faults in mid-press; into docs/reliability.md, docs/rehearsal.md
 	$(BIN)/python benchmarks/attack/run.py --write
 	$(BIN)/python benchmarks/figures.py --only wires-faults
-
-soak: .venv/dev.stamp ## feed each on-line estimator 5e7 samples and 2e7 hostile ones, for docs/reliability.md; hours
-	$(BIN)/python benchmarks/figures.py --only soak hostile hostile-force
 
 figures: .venv/dev.stamp ## make every figure of the documents whose sources have changed; hours, resumable
 	$(BIN)/python benchmarks/figures.py

@@ -3,7 +3,7 @@
     python benchmarks/force/hostile.py [--samples 20000000] [--arms ur5e fr3] [--seed 0]
 
 A tenth of the readings and a twentieth of the positions are one of fifteen values from NaN to 1e300, and the ticks
-missed may be anything; the rest is noise about a press, or a walk of any pace. `make soak` runs it.
+missed may be anything; the rest is noise about a press, or a walk of any pace.
 """
 
 from __future__ import annotations

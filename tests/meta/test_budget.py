@@ -14,12 +14,12 @@ ROOM = 1.005
 """Factor by which a figure may exceed its budget, so that two people can add a line on the same day."""
 BUDGET = {
     "distributions": 2,
-    "files": 445,
-    "tokens": 598904,
+    "files": 424,
+    "tokens": 582800,
     "tokens in a line of code": 10.34,
     "lines of tests": 49528,
     "lines of benchmarks": 12778,
-    "words in documents": 50488,
+    "words in documents": 46000,
     "private imports from another distribution": 0,
     "classes of one name": 4,
     "modules without a test of their name": 209,

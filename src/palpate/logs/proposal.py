@@ -497,23 +497,31 @@ def _pair(
         reference, partner = (position, force) if places else (force, position)
         guesses.append(f"{partner.name!r} is used: of all columns it correlates most with {reference.name!r}")
     elif not by_name:
-        smooth, rough = sorted((position, force), key=statistics.roughness)
-        cause = _cause(moving, smooth, rough)
-        alike = statistics.roughness(rough) < _MIN_ROUGHER * statistics.roughness(smooth)
-        if (alike and not cause) or (
-            len(moving) > _MAX_UNNAMED and not _other_units(others, (smooth, rough))
-        ):
-            return None
-        position, force = (smooth, rough) if cause is None else (cause, smooth)
-        if (
-            position.span > _SIZES["length"][0] / unit(_SIZES["length"][2]).factor
-        ):  # no probe's travel in m or mm
-            return None
-        why = "the smoother is" if cause is None else f"both follow the motion of {cause.name!r}, which is"
-        guesses.append(
-            f"the columns have no names: {smooth.name!r} and {rough.name!r} move together most, and {why} taken for"
-            " the position"
-        )
+        return _pair_without_names((position, force), moving, others, guesses)
+    return position, force
+
+
+def _pair_without_names(
+    pair: tuple[ColumnStatistics, ColumnStatistics],
+    moving: Sequence[ColumnStatistics],
+    others: Sequence[ColumnStatistics],
+    guesses: list[str],
+) -> tuple[ColumnStatistics, ColumnStatistics] | None:
+    """Position and force of two columns that move together: the smoother is the position, or what moves both."""
+    smooth, rough = sorted(pair, key=statistics.roughness)
+    cause = _cause(moving, smooth, rough)
+    alike = statistics.roughness(rough) < _MIN_ROUGHER * statistics.roughness(smooth)
+    if (alike and not cause) or (len(moving) > _MAX_UNNAMED and not _other_units(others, (smooth, rough))):
+        return None
+    position, force = (smooth, rough) if cause is None else (cause, smooth)
+    longest_travel = _SIZES["length"][0] / unit(_SIZES["length"][2]).factor  # of a probe, in m or mm
+    if position.span > longest_travel:
+        return None
+    why = "the smoother is" if cause is None else f"both follow the motion of {cause.name!r}, which is"
+    guesses.append(
+        f"the columns have no names: {smooth.name!r} and {rough.name!r} move together most, and {why} taken for"
+        " the position"
+    )
     return position, force
 
 
