@@ -208,7 +208,8 @@ def _fit(force: Array, time: Array, integral: Array, stays: list[slice]) -> _Lea
 def _decays(force: Array, leak: Array, stays: list[slice], fit: _LeakFit) -> bool:
     """True if the force within the stays decays at the rate of the leak, whatever lies between their levels.
 
-    An adhesive or plastic surface shifts the level from one stay to the next as a leak does, but at rest it stays there.
+    An adhesive or plastic surface shifts the level from one stay to the next as a leak does, but within a stay it does
+    not change.
     """
     lengths = [stay.stop - stay.start for stay in stays]
     own_levels = np.repeat(np.eye(len(stays)), lengths, axis=0)
