@@ -88,7 +88,8 @@ def run_in_environment(path: str) -> None:
         capture_output=True,
         env={"PATH": os.environ["PATH"], **case["variables"]},
     )
-    lines, heard = ran.stderr.splitlines(), "2>" not in streams
+    ascii_text = ran.stderr.replace(b"\xff\xfe", b"").replace(b"\0", b"")  # of UTF-16, too
+    lines, heard = ascii_text.splitlines(), "2>" not in streams
     silent = ran.returncode == 0 and not ran.stdout
     told = ran.returncode != 2 or not heard or (len(lines) == 1 and lines[0].startswith(b"palpate: "))
     assert ran.returncode in {0, 1, 2}, f"code {ran.returncode}: {case} {lines[-2:]}"

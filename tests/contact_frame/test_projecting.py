@@ -141,6 +141,14 @@ def test_what_needs_an_orientation_is_refused_without_one(what):
         project(record, NEEDS_A_TURN[what])
 
 
+def test_a_log_without_a_whole_force_is_refused_in_one_line():
+    world = any_world(np.random.default_rng(0))
+    record = log_of(world, np.random.default_rng(0), seed=0)
+    axis = np.full(len(record), np.nan)
+    with pytest.raises(InputError, match="no row has a reading of all three axes"):
+        project(Record({**record.columns, "force_z": axis}, record.units, record.meta), frame_of(world))
+
+
 def test_axes_that_nobody_names_are_not_guessed():
     rng = np.random.default_rng(9)
     record = log_of(any_world(rng, frame="tool"), rng)

@@ -230,7 +230,12 @@ def compensate(
 
     Returns:
         The signals without these readings, the force, and notes as a record's meta has them.
+
+    Raises:
+        InputError: no row has a force.
     """
+    if not finite_rows(signals.force).any():
+        raise InputError("no row has a reading of all three axes of the force: check the columns of --wrench")
     compensated = _remove_load(signals, frame)
     saturated = saturated_rows(signals.recorded, signals.position, compensated.inside)
     if not saturated.any():
