@@ -70,16 +70,6 @@ def test_a_fluid_has_no_stiffness():
     assert found.K.verdict is not Verdict.IDENTIFIED
 
 
-def test_a_drift_of_one_press_widens_its_stiffness():
-    """A position's zero that drifts makes the loading stiffer than the return; one press cannot tell it from K."""
-    time, depth = pressed()
-    time, depth = time[time < 7], depth[time < 7]
-    found = identified(time, depth, K * np.maximum(depth + 2e-5 * time, 0))
-    point = found.working_point.stiffness
-    assert "time" in point.budget
-    assert point.ci95[0] < K < point.ci95[1]
-
-
 def test_a_creep_test_has_its_loading():
     """A load is put on within a second, and held for ten minutes."""
     time = np.arange(0, 620, 0.1)

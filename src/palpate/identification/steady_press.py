@@ -328,7 +328,6 @@ def steady_press(
         headline = headline.spread_as(slopes_at(similar, WINDOW, lag, rest))
     if not headline.stiffness.with_cause("repetition", Contribution(0.0)).known_to(1.0):
         return None
-    headline = _against_return(headline, loadings, curves, rest)
     windows = [(level - HALF_WINDOW, min(level + HALF_WINDOW, 1.0)) for level in LEVELS]
     others = [slopes_at(loadings, window, lag, rest) for window in windows]
     known = tuple(slopes for slopes in others if slopes and slopes.stiffness.known_to(1.0))
@@ -338,28 +337,6 @@ def steady_press(
         longest = max(of_direction, key=lambda curve: curve.span, default=None)
         drawn_curves.append(np.stack([longest.depth, longest.force]) if longest else np.empty((2, 0)))
     return SteadyPress(headline, known, *map(thin_curve, drawn_curves))
-
-
-def _against_return(
-    headline: Slopes, loadings: Sequence[Curve], curves: Sequence[Curve], rest: float
-) -> Slopes:
-    """The slope of some loadings, with the difference from the returns' slope at that force as a cause.
-
-    A return goes over the same positions at other times: the force of a surface is the same there, that of a breath, of
-    a warming sensor or of a relaxation is not. One press cannot tell them; the mean of n presses has a root of n less.
-    """
-    low = max(curve.reach[0] for curve in loadings)
-    high = min(curve.reach[1] for curve in loadings)
-    ends = [low + share * (high - low) for share in WINDOW]
-    windows = [curve.between(*ends) for curve in curves if curve.loads is not loadings[0].loads]
-    tangents = [window.tangent(headline.force + rest) for window in windows if window is not None]
-    if not tangents:
-        return headline
-    slope, variance, *_ = np.mean(tangents, axis=0)
-    stiffness = headline.stiffness
-    excess = (slope - stiffness.value) ** 2 - stiffness.half**2 - NORMAL**2 * variance
-    half = float(np.sqrt(max(excess, 0.0) / len(loadings)))
-    return replace(headline, stiffness=stiffness.with_cause("time", Contribution.within(half)))
 
 
 def thin_curve(curve: Array) -> Array:

@@ -156,15 +156,12 @@ def _one_stiffness(parameters: dict[str, Parameter], point: WorkingPoint, steady
     """K as a reading of the stiffness that the working point is a reading of, too.
 
     A K that excludes the working point is not identified: the stiffness changes with the force. Of presses at constant
-    speed (`steady`) K is the narrower of model and tangent, and the tangent where several agree against the model or
-    where the returns contradict it: the model is fitted to both.
+    speed (`steady`) K is the narrower of model and tangent, and the tangent where they exclude each other.
     """
     K, slope = parameters["K"], point.stiffness
-    if steady and "time" in slope.budget:
-        return slope
     both = K.verdict is slope.verdict is Verdict.IDENTIFIED and K.unit == slope.unit
     excluded = both and _excludes(K, parameters, point)
-    if excluded and not (steady and len(point.each) > 1):
+    if excluded and not steady:
         return replace(K, verdict=Verdict.NOT_IDENTIFIABLE, reason=_CONTRADICTS)
     narrower = (
         K.verdict is Verdict.IDENTIFIED and not excluded and (not both or (K.std or 0) < (slope.std or 0))
