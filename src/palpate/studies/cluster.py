@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import pickle
+import socket
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
@@ -99,6 +100,7 @@ class Cluster:
         self.address = address
         self._dask: Any = distributed  # which has no types
         try:
+            _check_listens(address)
             self._client = self._dask.Client(address, timeout=CONNECT, set_as_default=False)
         except Exception as error:
             raise InputError(
@@ -192,6 +194,13 @@ def _wait(completed: Any, limit: float, send_again: Callable[[], None]) -> None:
             send_again()
             limit *= QUIET_FACTOR
         time.sleep(POLL)
+
+
+def _check_listens(address: str) -> None:
+    """Fail where nothing listens, before there is a client: one that never connected can block when it is collected."""
+    from distributed.comm.addressing import get_address_host_port
+
+    socket.create_connection(get_address_host_port(address), CONNECT).close()
 
 
 def _first_line(error: BaseException) -> str:
