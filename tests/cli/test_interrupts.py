@@ -92,7 +92,7 @@ def test_what_cannot_be_drawn_does_not_lose_what_was_simulated(tmp_path, monkeyp
         raise error
 
     monkeypatch.setattr(pages, "build_figure", full)
-    assert main(["run", "mine.toml", "--out", "results"]) == 2
+    assert main(["run", "mine.toml", "--out", "results", "--figures", "png"]) == 2
     line = capsys.readouterr().err
     assert line.count("\n") == 1
     assert "the record is in results" in line

@@ -417,7 +417,7 @@ def test_what_stands_there_is_not_replaced_unasked(capsys, elsewhere):
 def test_bounds_of_the_force_state_their_condition(capsys, elsewhere):
     assert main(["tune", *RANGE, "--slide"]) == 0
     text = " ".join(capsys.readouterr().out.split())
-    assert "on springs), settles" in text
+    assert "N on springs, settles" in text
     assert "on springs no normal, right or wrong" in text
 
 

@@ -37,10 +37,15 @@ class Eager(StopLaw):
 
 
 def judge(make, name, case, approach, runs=4, simulator="axis"):
-    args = argparse.Namespace(
-        arm=name, runs=runs, seed=0, force=FORCE, force_max=FORCE_MAX, cap=CAP, simulator=simulator
-    )
-    return press_judge.judge(make, case, args, approach)
+    law = press_judge.Candidate(name, make, approach, "")
+    draws = [draw_press(ARMS[name], case, FORCE, CAP, seed) for seed in range(runs)]
+    made = press_judge.press_all(law, case, simulator, draws, argparse.Namespace(force=FORCE, rows=None))
+    peaks = [run.peak for run in made]
+    return {
+        "above": sum(peak > FORCE_MAX for peak in peaks),
+        "peak_N": max(peaks),
+        "fast": sum(run.fast for run in made),
+    }
 
 
 @pytest.mark.parametrize("name", ARMS)

@@ -46,7 +46,11 @@ IN_SLIDE = {
     "size > c->force_limit ? LIMITED : SATURATED": "a force between 99 and 100 % of the sensor's scale, the limit",
     "state->numbers[112] == 6.0": "a blocked tip, which the recordings of the force loop have",
     "length > 1e-12 ? Vec3_truediv(a, length) : otherwise": "a vector that has a length, but for rounding",
-    "lifted > 3.0 * needed && felt > c->level": "a sensor that drifts between two touches, which no recording has",
+    "to_rise < -2.0 * height - law->spacing && felt > c->level": "a sensor that drifts between two touches,"
+    " which no recording has",
+    "state->numbers[112] == 10.0": "likewise: the trouble of that sensor",
+    "left < ARRIVED * law->spacing && to_rise < 0.0": "a tip over the next place that is not yet as high as is safe: it"
+    " goes aside no further than its height allows",
     "way <= 0.0": "a tip that stands still to the last bit while the slide learns",
     "s.at[TROUBLE] == LOST && guard->trouble == FINE": "a fault in the ticks after a lost contact, which are too few",
     "lead_velocity": "a tip that a servo moves; the recorded slides are those of a position arm",

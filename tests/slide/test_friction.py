@@ -210,9 +210,9 @@ def test_a_slides_own_record_is_read_with_its_frames_and_without_its_touches(tmp
     capsys.readouterr()
     main(["identify", str(tmp_path / "out" / "record.parquet"), "--json"])
     own = json.loads(capsys.readouterr().out)["parameters"]
-    for name, truth in (("mu", 0.3), ("K", 8e3)):
-        assert own[name]["verdict"] == "identified"
-        assert own[name]["ci95"][0] < truth < own[name]["ci95"][1]
+    assert own["mu"]["verdict"] == "identified"
+    assert own["mu"]["ci95"][0] < 0.3 < own["mu"]["ci95"][1]
+    assert "dither" in own["K"]["reason"]  # at a constant force the touches alone would show it
 
 
 def test_the_length_of_a_spheres_friction_is_within_its_factor():

@@ -36,6 +36,10 @@ _CAUSES = {
     "octaves": Cause("the difference between frequencies", "excite a wider band (palpate excite)", "A"),
     "blocks": Cause("differences between parts of the log", "press longer, or more often, at one depth", "A"),
     "repetition": Cause("differences between parts of the log", "press more often", "A"),
+    "dynamic stiffness": Cause(
+        "the difference between the model and the dynamic stiffness",
+        "keep the motion near one frequency and depth",
+    ),
     "unexplained": Cause("a force that the model does not explain", "keep the motion near one depth"),
     "missing force": Cause(
         "a mass below zero", "compensate the tool's inertia, or measure nearer to the surface"

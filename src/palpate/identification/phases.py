@@ -108,6 +108,10 @@ def _is_gone_at_rest(force: Array, position: Array) -> bool:
     fastest = float(np.percentile(np.abs(speed[deep]), 98)) if deep.any() else 0.0
     advances = deep & (speed > _DEEP_FRACTION * fastest)
     rests = deep & (np.abs(speed) < _SLOW_FRACTION * fastest)
+    if rests.any():  # a surface may lie deeper than the probe rests: on the way there is no force either
+        limit = float(np.median(depth[rests]))
+        advances &= depth <= limit
+        rests &= depth >= limit
     if min(map(np.count_nonzero, (advances, rests, free))) < _MIN_ROWS:
         return False
     level = float(np.median(force[free]))
@@ -197,9 +201,9 @@ def _fit(force: Array, time: Array, integral: Array, stays: list[slice]) -> _Lea
     noise = estimate_noise(residual, rows, 3)
     effective = min(noise.effective, len(rows))
     cov = noise.variance * len(rows) / effective * np.linalg.pinv(leak.T @ leak)
-    gain = effective * np.log(float(other @ other) / max(float(residual @ residual), 1e-300)) + np.log(
-        effective
-    )
+    gain = effective * np.log(
+        max(float(other @ other), 1e-300) / max(float(residual @ residual), 1e-300)
+    ) + np.log(effective)
     fit = _LeakFit(theta, np.asarray(cov, np.float64), float(gain))
     certain = theta[2] < -_MIN_RATE_STDS * np.sqrt(cov[2, 2])
     return fit if certain and gain > 0 and _decays(force[rows], leak, stays, fit) else None

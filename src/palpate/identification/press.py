@@ -21,10 +21,12 @@ from palpate.identification.slope import (
     ripple_error,
     slope_between,
     tangent_at,
+    upper_slope,
 )
 from palpate.identification.spectrum import (
     build_working_point,
     dynamic_stiffness,
+    storage_near,
     working_point,
 )
 from palpate.identification.steady_press import HALF_WINDOW, Slopes, SteadyPress, thin_curve
@@ -289,3 +291,12 @@ def _among_loadings(headline: Slopes, problem: Problem) -> Slopes:
     excess = max(difference**2 - tangent.half**2 - stiffness.half**2, 0.0)
     scatter = Contribution.within(float(np.sqrt(excess)))
     return replace(headline, stiffness=stiffness.with_cause("loadings", scatter))
+
+
+def stiffness_at_point(problem: Problem, force: Array, point: WorkingPoint) -> float | None:
+    """Stiffness at a working point by another force, shape (m,), at the same rows [N/m]; None if it shows none."""
+    problem = replace(problem, force=force)
+    if point.source == "press":
+        slope = upper_slope(loadings_in(problem, problem.lag.value))
+        return None if slope is None else slope.stiffness.value
+    return storage_near(problem, point.frequency_Hz)

@@ -103,6 +103,24 @@ def dynamic_stiffness(
     return tuple(spectrum)
 
 
+def storage_near(problem: Problem, frequency: float) -> float | None:
+    """Storage of the octave within half an octave of a frequency [Hz]; None if no segment shows it [N/m]."""
+    motion = problem.motion
+    lag = problem.lag.value
+    dt = problem.period
+    channels = motion.moved(0, lag), motion.moved(1, lag), problem.force
+    length = octaves.longest_length(problem.segments)
+    while length >= octaves.MIN_SEGMENT_ROWS:
+        if _MIN_LINE < np.sqrt(2) * frequency * length * dt < 2 * _MAX_LINE:
+            line = _fit(_blocks(problem, channels, length, 0))
+            line_frequency = line.omega / (2 * np.pi)
+            in_lines = _MIN_LINE <= line_frequency * length * dt <= _MAX_LINE
+            if in_lines and abs(np.log2(line_frequency / frequency)) < 0.5:
+                return float(line.parts[0])
+        length //= 2
+    return None
+
+
 def _encoder_errors(problem: Problem, position: Array, lag: float) -> list[Array]:
     """Error of an encoder in this motion, once for each phase of its counts, behind the same filter, shape (m,) each.
 

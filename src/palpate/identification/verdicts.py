@@ -8,6 +8,7 @@ import numpy as np
 from palpate.identification.budget import Budget, FittedParameters, Prediction, Spread
 from palpate.identification.causes import NOISE, Code, Warn, cause_of
 from palpate.identification.options import LAG, Options
+from palpate.identification.press import stiffness_at_point
 from palpate.identification.problem import Problem
 from palpate.identification.result import WorkingPoint
 from palpate.identification.selection import Choice
@@ -36,9 +37,6 @@ _UNKNOWN_SURFACE = (
     "a power law needs depth and force from the touch on, and the log never leaves the surface:"
     " let it begin in free motion"
 )
-_CONTRADICTS = (
-    "it contradicts the stiffness of the first line: the stiffness changes with the force or the speed"
-)
 Units = Mapping[str, str]
 """Of a record's columns; here of its force and its position."""
 
@@ -50,7 +48,7 @@ def verdicts(
     contacts = choice.problem.contacts
     model = choice.answer.fit.model
     tangent = None if contacts.press is None or model.nonlinear else point
-    fitted = _add_missing_force(choice.answer)
+    fitted = _add_missing_force(against_working_point(choice.answer, point))
     if tangent is not None:
         fitted = replace(fitted, budget=_with_presses(fitted, tangent))
     scales = np.array(
@@ -71,9 +69,9 @@ def verdicts(
         if parameter.verdict is Verdict.IDENTIFIED:
             parameters[name] = replace(parameter, verdict=Verdict.NOT_IDENTIFIABLE, reason=refused)
     if tangent is not None:
-        parameters = _show_stiffness_alone(parameters)
-    if point is not None:
-        parameters |= {"K": _one_stiffness(parameters, point, tangent is not None)}
+        parameters = _press_stiffness(parameters, tangent)
+    elif point is not None and point.source == "press":
+        parameters = _agreeing(parameters, point.stiffness)
     return parameters, _warnings(parameters, fitted, choice.problem, options.tolerance)
 
 
@@ -115,6 +113,50 @@ def _highest(fitted: FittedParameters, name: str) -> float:
     )
 
 
+def against_working_point(answer: FittedParameters, point: WorkingPoint | None) -> FittedParameters:
+    """An answer with the gap between the stiffness of its force at the working point and of the log's as a cause.
+
+    Both are read in the same way: the slope of a press has a mass and a damping in it, in the log as in the answer.
+    A parameter may be off by as much as it moves if the answer is made to agree: theta + C g (g' C g)^-1 gap, C the
+    covariance and g the stiffness' derivatives (a measurement without error in a Kalman filter). Nothing is compared
+    without a working point that has an interval.
+    """
+    if point is None or point.stiffness.ci95 is None or point.stiffness.value is None:
+        return answer
+    problem = answer.problem
+    fitted = answer.fit
+    log_stiffness, model_stiffness = (
+        stiffness_at_point(problem, force, point) for force in (problem.force, fitted.force)
+    )
+    if log_stiffness is None or model_stiffness is None:
+        return answer
+    slope = np.zeros(len(answer.names))
+    for place, name in enumerate(answer.names):
+        if name in fitted.theta:
+            step = 1e-4 * (abs(fitted.theta[name]) or 1.0)
+            theta = fitted.theta | {name: fitted.theta[name] + step}
+            shifted = Prediction.of(fitted.model, problem.motion, problem.force, theta, fitted.lag)
+            slope[place] = (
+                (stiffness_at_point(problem, shifted.force, point) or model_stiffness) - model_stiffness
+            ) / step
+    shared_causes = "calibration", "friction", "loadings"  # of the answer, too
+    point_causes = {
+        cause: contribution
+        for cause, contribution in point.stiffness.contributions.items()
+        if cause not in shared_causes
+    }
+    direction = answer.cov @ slope
+    power = float(slope @ direction)
+    gap = max(
+        abs(model_stiffness - log_stiffness)
+        - float(np.hypot(NORMAL * np.sqrt(max(power, 0.0)), half_width(point_causes))),
+        0.0,
+    )
+    return answer.with_cause(
+        "dynamic stiffness", direction * gap / power if power > 0 else np.zeros(len(slope))
+    )
+
+
 def _add_missing_force(answer: FittedParameters) -> FittedParameters:
     """An answer whose damping may be off by as much force as its mass is certainly below zero.
 
@@ -142,42 +184,35 @@ def _with_presses(answer: FittedParameters, point: WorkingPoint) -> Budget:
     return answer.budget | {"repetition": Spread(variance, freedom)}
 
 
-def _show_stiffness_alone(parameters: dict[str, Parameter]) -> dict[str, Parameter]:
-    """At constant speed a log does not show the other parameters: a negative one is no contradiction."""
-    return {
+def _press_stiffness(parameters: dict[str, Parameter], point: WorkingPoint) -> dict[str, Parameter]:
+    """K of presses at constant speed is their tangent, unless a model among them knows it better; no more is shown."""
+    rejected = {
         name: replace(parameter, verdict=Verdict.NOT_IDENTIFIABLE, reason=_CONSTANT_SPEED)
-        if parameter.verdict is Verdict.REJECTED
-        else parameter
         for name, parameter in parameters.items()
+        if parameter.verdict is Verdict.REJECTED
     }
+    stiffness = parameters["K"]
+    if len(point.each) > 1 and stiffness.ci95 is not None:
+        overlaps = stiffness.ci95[0] <= max(point.each) and stiffness.ci95[1] >= min(point.each)
+        stiffness = stiffness if overlaps else point.stiffness
+    identified = [
+        parameter for parameter in (point.stiffness, stiffness) if parameter.verdict is Verdict.IDENTIFIED
+    ]
+    best = min(identified, key=lambda parameter: parameter.std or np.inf, default=point.stiffness)
+    return parameters | rejected | {"K": best}
 
 
-def _one_stiffness(parameters: dict[str, Parameter], point: WorkingPoint, steady: bool) -> Parameter:
-    """K as a reading of the stiffness that the working point is a reading of, too.
-
-    A K that excludes the working point is not identified: the stiffness changes with the force. Of presses at constant
-    speed (`steady`) K is the narrower of model and tangent, and the tangent where they exclude each other.
-    """
-    K, slope = parameters["K"], point.stiffness
-    both = K.verdict is slope.verdict is Verdict.IDENTIFIED and K.unit == slope.unit
-    excluded = both and _excludes(K, parameters, point)
-    if excluded and not steady:
-        return replace(K, verdict=Verdict.NOT_IDENTIFIABLE, reason=_CONTRADICTS)
-    narrower = (
-        K.verdict is Verdict.IDENTIFIED and not excluded and (not both or (K.std or 0) < (slope.std or 0))
-    )
-    return K if narrower or not steady else slope
-
-
-def _excludes(K: Parameter, parameters: dict[str, Parameter], point: WorkingPoint) -> bool:
-    """True if no K in its interval, less a mass or with a branch that relaxes, is a stiffness at the working point."""
-    slope = point.stiffness
-    if K.ci95 is None or slope.ci95 is None:
-        return False
-    highest = {name: max((p.ci95 or (0.0, 0.0))[1], 0.0) for name, p in parameters.items()}
-    inertia = (2 * np.pi * point.frequency_Hz) ** 2 * highest.get("M", 0.0) * (point.source == "octave")
-    ends = *slope.ci95, *point.each
-    return bool(K.ci95[0] > max(ends) + inertia or min(ends) > K.ci95[1] + highest.get("K1", 0.0))
+def _agreeing(parameters: dict[str, Parameter], slope: Parameter) -> dict[str, Parameter]:
+    """K is not identified where it excludes the slope of the press, less the branch by which a solid relaxes."""
+    K = parameters.get("K")
+    both = K is not None and K.verdict is slope.verdict is Verdict.IDENTIFIED and K.unit == slope.unit
+    if not (both and K and K.ci95 and slope.ci95):
+        return parameters
+    branch = parameters["K1"].ci95 if "K1" in parameters else None
+    if K.ci95[0] <= slope.ci95[1] and slope.ci95[0] <= K.ci95[1] + (branch[1] if branch else 0.0):
+        return parameters
+    reason = "it contradicts the slope of the press, of the first line: the stiffness changes with the force"
+    return parameters | {"K": replace(K, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)}
 
 
 def _reject_negative(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Parameter]:

@@ -143,9 +143,10 @@ class NeuralProbe(Readable):
         """The force that the network gives for displacement, velocity and acceleration, shape (3,) [N]."""
         x = _three(regressor, "regressor")
         signals = self._memory.signals.copy()
-        signals[:3] = self.scale * x
-        forward(self._net.sizes, self._memory.weights, signals)
-        answer = float(self._net.amplitude[0] * signals[-1])
+        with np.errstate(over="ignore", invalid="ignore"):
+            signals[:3] = self.scale * x
+            forward(self._net.sizes, self._memory.weights, signals)
+            answer = float(self._net.amplitude[0] * signals[-1])
         if not np.isfinite(answer):
             raise InputError(
                 f"the network gives no finite force for the regressor {x.tolist()}; give a smaller one"

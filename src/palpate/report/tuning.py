@@ -131,7 +131,7 @@ def lines(tuning: Tuning, written: Sequence[object] = ()) -> Iterator[Text]:
     slowest = _slowest(tuning)
     touch = [
         f"at most {quantity(gains.approach, 'm')}/s",
-        f"peak {quantity(tuning.peak, 'N')}",
+        f"peak {quantity(tuning.peak, 'N')} on springs",
         f"settles in {slowest:.2g} s" if isfinite(slowest) else "does not settle",
         f"overshoot {100 * tuning.overshoot:.2g} %",
     ]
