@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Indices
 from palpate.identification.causes import Code, Warn
 from palpate.identification.free_motion import find_free_motion
 from palpate.identification.least_squares import estimate_noise
@@ -126,9 +126,9 @@ _MAX_ROWS = 1 << 13
 _FRACTIONS = (0.5, 0.35, 0.25, 0.12, 0.06)
 """Fractions of the position's range, from either end, in which free motion may lie."""
 _MIN_STAY_ROWS = 8
+"""Rows of a stay in free motion that is fitted."""
 _MIN_RATE_STDS = 5.0
 """Standard errors of the rate from which on the sensor leaks: wrong once in a million."""
-
 _DECAY_STDS = 3.0
 """Standard errors of a decay within the stays from which on it is seen, and to which it agrees with the leak."""
 
@@ -198,13 +198,11 @@ def _fit(force: Array, time: Array, integral: Array, stays: list[slice]) -> _Lea
     u = time[rows] / time[-1]
     bend = np.column_stack([line, u**2, u**3])
     (theta, residual), (_, other) = (_solve(columns, force[rows]) for columns in (leak, bend))
-    noise = estimate_noise(residual, rows, 3)
-    effective = min(noise.effective, len(rows))
-    cov = noise.variance * len(rows) / effective * np.linalg.pinv(leak.T @ leak)
+    cov, effective = _covariance(leak, residual, rows)
     gain = effective * np.log(
         max(float(other @ other), 1e-300) / max(float(residual @ residual), 1e-300)
     ) + np.log(effective)
-    fit = _LeakFit(theta, np.asarray(cov, np.float64), float(gain))
+    fit = _LeakFit(theta, cov, float(gain))
     certain = theta[2] < -_MIN_RATE_STDS * np.sqrt(cov[2, 2])
     return fit if certain and gain > 0 and _decays(force[rows], leak, stays, fit) else None
 
@@ -219,14 +217,8 @@ def _decays(force: Array, leak: Array, stays: list[slice], fit: _LeakFit) -> boo
     own_levels = np.repeat(np.eye(len(stays)), lengths, axis=0)
     columns = np.column_stack([leak[:, 1:], own_levels])
     theta, residual = _solve(columns, force)
-    noise = estimate_noise(residual, np.arange(len(force)), columns.shape[1])
-    variance = (
-        noise.variance
-        * len(force)
-        / min(noise.effective, len(force))
-        * np.linalg.pinv(columns.T @ columns)[1, 1]
-    )
-    rate, std = theta[1], float(np.sqrt(variance))
+    cov, _ = _covariance(columns, residual, np.arange(len(force)))
+    rate, std = theta[1], float(np.sqrt(cov[1, 1]))
     return bool(rate < -_DECAY_STDS * std and abs(rate - fit.theta[2]) < _DECAY_STDS * std)
 
 
@@ -235,6 +227,14 @@ def _solve(columns: Array, force: Array) -> tuple[Array, Array]:
     scale = np.abs(columns).max(axis=0)
     theta = np.linalg.lstsq(columns / scale, force, rcond=None)[0] / scale
     return theta, force - columns @ theta
+
+
+def _covariance(columns: Array, residual: Array, rows: Indices) -> tuple[Array, float]:
+    """Covariance of parameters by least squares, and the independent rows that its residuals are worth."""
+    noise = estimate_noise(residual, rows, columns.shape[1])
+    effective = min(noise.effective, len(rows))
+    cov = noise.variance * len(rows) / effective * np.linalg.pinv(columns.T @ columns)
+    return np.asarray(cov, np.float64), float(effective)
 
 
 def _is_free(force: Array, position: Array, direction: float, limit: float) -> bool:
