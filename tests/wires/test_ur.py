@@ -54,9 +54,9 @@ def test_it_presses_with_the_force_asked_for(folder, here, capsys, address, way)
     assert len(record) == told["lateness"]["ticks"]
     assert main(["identify", "rec/record.parquet", "--json"]) in {0, 1}
     assert json.loads(capsys.readouterr().out)["working_point"]["stiffness"]["value"] is not None
-    # The arm's own 50 kN/m are in series. Readings that are late by two ticks move the loop's own estimate.
-    ratio = told["stiffness_N_per_m"][0] / (4000 / (1 + 4000 / 5e4))
-    assert told["lateness"]["p99.9_s"] > 2 * 0.002 or 0.5 < ratio < 2.0
+    # The arm's own 50 kN/m are in series. The certificate counts readings that are late by two ticks.
+    (K, std), felt = told["stiffness_N_per_m"], 4000 / (1 + 4000 / 5e4)
+    assert told["lateness"]["p99.9_s"] > 2 * 0.002 or abs(K - felt) < max(3 * std, 0.1 * felt)
 
 
 @pytest.mark.real_time
