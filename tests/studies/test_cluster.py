@@ -1,7 +1,6 @@
 """A study on a Dask cluster of real processes: the same table as here, whatever dies on the way."""
 
 import json
-import os
 import shutil
 import signal
 import subprocess
@@ -147,13 +146,20 @@ def test_a_worker_with_other_sources_refuses():
 
 
 @pytest.mark.long
-def test_a_run_that_kills_workers_has_a_result_of_its_own(tmp_path):
-    with local_cluster(tmp_path, workers=6) as running:
+def test_a_run_that_kills_workers_has_a_result_of_its_own_and_costs_no_other(tmp_path, monkeypatch):
+    """It dies beside others in a task, and then alone; short runs share one."""
+    monkeypatch.setattr(clusters, "MAX_SENT", 4)
+    deadly = "__import__('os')._exit(7)"
+    items = [str(i) for i in range(250)]
+    items[180] = deadly
+    with local_cluster(tmp_path, workers=10) as running:
         runner = Cluster(running.address)
-        (found,) = runner.map(os._exit, [7], lambda item, why: (item, why))
+        found = list(runner.map(eval, items, lambda item, why: (item, why)))
         runner.close()
-    assert found[0] == 7
-    assert "died" in found[1]
+    (died,) = (result for result in found if isinstance(result, tuple))
+    assert died[0] == deadly
+    assert "died" in died[1]
+    assert sorted(result for result in found if result != died) == [i for i in range(250) if i != 180]
 
 
 @pytest.mark.long

@@ -1,4 +1,4 @@
-"""The runs of a study on a Dask cluster: each run is a task, and Dask repeats the tasks of a worker that dies."""
+"""The runs of a study on a Dask cluster: short runs share a task, and Dask repeats the tasks of a worker that dies."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import socket
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from itertools import islice
+from itertools import count, islice
 from typing import Any, NamedTuple, TypeVar
 
 from palpate.errors import InputError, how_to_install
@@ -19,8 +19,11 @@ from palpate.studies.run_one import FAILED, RunJob, run_one
 A = TypeVar("A")
 B = TypeVar("B")
 
-MAX_SENT = 1000
-"""Tasks at the cluster at most: enough for hundreds of workers, little memory."""
+MAX_SENT = 200
+"""Tasks at the cluster at most: enough for a hundred workers, little memory."""
+TASK, MAX_RUNS = 0.5, 100
+"""Time that a task takes, unless one run takes longer [s], and its runs at most. A task costs the scheduler and the
+client 4 ms each (`benchmarks/cluster.py`): as tasks of one run, runs of 5 ms would be no faster on many machines."""
 PATIENCE = 30.0
 """Time within which a cluster must have a worker [s]."""
 QUIET, QUIET_FACTOR = 5.0, 3.0
@@ -141,39 +144,30 @@ class Cluster:
         Raises:
             InputError: the scheduler went away, or the workers cannot do it.
         """
-        waiting = enumerate(items)
-        unfinished: dict[int, A] = {}
-        sent: dict[Any, int] = {}
-
-        def send(tasks: Iterable[tuple[int, A]]) -> list[Any]:
-            futures = []
-            for number, item in tasks:
-                future = self._client.submit(work, item, pure=False)
-                unfinished[number], sent[future] = item, number
-                futures.append(future)
-            return futures
-
+        waiting, tasks = iter(items), _Tasks(partial(self._client.submit, _run_all, work, pure=False))
         try:
-            completed = self._dask.as_completed(send(islice(waiting, MAX_SENT)), loop=self._client.loop)
+            first = tasks.send([item] for item in islice(waiting, MAX_SENT))
+            completed = self._dask.as_completed(first, loop=self._client.loop)
             longest = 0.0
-            while unfinished:
+            while tasks.unfinished:
                 begin = time.monotonic()
                 limit = max(QUIET, QUIET_FACTOR * longest)
-                _wait(completed, limit, lambda: completed.update(send(list(unfinished.items()))))
+                _wait(completed, limit, lambda: completed.update(tasks.send_again()))
                 longest = max(longest, time.monotonic() - begin)
                 future = next(completed)
-                number = sent.pop(future)
-                if number not in unfinished:  # a task that was sent twice
-                    continue
-                item = unfinished.pop(number)
+                batch = tasks.take(future)
                 try:
-                    result: B = future.result()
+                    results, seconds = future.result() if batch else ([], TASK)
                 except self._dask.KilledWorker as error:
                     if killed is None:
                         raise
-                    result = killed(item, _first_line(error))
-                yield result
-                completed.update(send(islice(waiting, 1)))
+                    if len(batch) > 1:  # one of them did it
+                        completed.update(tasks.send([item] for item in batch))
+                        continue
+                    results, seconds = [killed(batch[0], _first_line(error))], TASK
+                yield from results
+                size = int(min(MAX_RUNS, 1 + TASK * len(batch) / seconds))
+                completed.update(tasks.send([list(islice(waiting, size))] if batch else []))
         except InputError:
             raise
         except Exception as error:
@@ -182,8 +176,47 @@ class Cluster:
                 "same command resumes"
             ) from error
         finally:
-            if sent and self._client.status == "running":
-                self._client.cancel(list(sent), force=True)
+            if tasks.futures and self._client.status == "running":
+                self._client.cancel(list(tasks.futures), force=True)
+
+
+class _Tasks:
+    """The tasks at the cluster; one that was sent twice is done with its first result.
+
+    Args:
+        submit: sends a batch of items, and returns its future.
+    """
+
+    def __init__(self, submit: Callable[[list[Any]], Any]):
+        self.unfinished: dict[int, list[Any]] = {}
+        self.futures: dict[Any, int] = {}
+        self._submit, self._numbers = submit, count()
+
+    def send(self, batches: Iterable[list[Any]]) -> list[Any]:
+        """Futures of these batches; an empty one is none."""
+        return self._send((next(self._numbers), batch) for batch in batches if batch)
+
+    def send_again(self) -> list[Any]:
+        """Further futures of all that is not finished."""
+        return self._send(list(self.unfinished.items()))
+
+    def take(self, future: Any) -> list[Any]:
+        """Batch of a future that is done; empty if another was done first."""
+        return self.unfinished.pop(self.futures.pop(future), [])
+
+    def _send(self, tasks: Iterable[tuple[int, list[Any]]]) -> list[Any]:
+        futures = []
+        for number, batch in tasks:
+            future = self._submit(batch)
+            self.unfinished[number], self.futures[future] = batch, number
+            futures.append(future)
+        return futures
+
+
+def _run_all(work: Callable[[A], B], items: Sequence[A]) -> tuple[list[B], float]:
+    """Results of `work` for each item, and the time that all took [s]; a task of a worker."""
+    begin = time.perf_counter()
+    return [work(item) for item in items], time.perf_counter() - begin
 
 
 def _wait(completed: Any, limit: float, send_again: Callable[[], None]) -> None:
