@@ -8,6 +8,8 @@ from __future__ import annotations
 import copy
 import pickle
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from operator import attrgetter
 
 import numpy as np
@@ -116,3 +118,23 @@ def test_any_calls_give_finite_numbers_or_one_line(name, examples):
     chosen = st.lists(call, min_size=CALLS, max_size=CALLS)
     bounded = settings(max_examples=examples, deadline=None, phases=[Phase.generate])
     given(chosen)(bounded(lambda choices: call_at_random(name, choices)))()
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_two_threads_that_share_an_object_leave_it_finite(name):
+    """In whatever order their calls come, each gives a result or one line."""
+    make, methods, results = CASES[name]
+    one = make()
+
+    def call_often(seed):
+        rng = np.random.default_rng(seed)
+        for _ in range(3000):
+            call, count = methods[rng.integers(len(methods))]
+            with suppress(InputError):
+                call(one, *(VALUES[rng.integers(len(VALUES))] for _ in range(count)))
+
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(call_often, (1, 2)))
+    for result in results:
+        value = attrgetter(result)(one)
+        assert value is None or np.isfinite(value).all()
