@@ -74,7 +74,7 @@ class OthersOptions:
     """ros2-admittance, fzi, crisp, franka or ur: the kind of controller whose YAML file is given. --stiffness names the
     surfaces on which it has to be stable, --rate its rate where the file has none. --out writes a corrected file."""
     delay: Time | None = None
-    """Everything that is late between a command and the force that it causes, such as 24:ms."""
+    """Total delay from a command to the reading of the force that it causes, as 24:ms."""
     mass: Mass | None = None
     """Mass of the arm at its tip along the axis, for a controller that gives torques."""
 

@@ -257,8 +257,8 @@ class IdentifyOutput(ReportOption, FigureFile):
     dpi: int | None = None
     "Resolution of a PNG; 110 if not given."
     table: Path | None = None
-    """Where to write a table for a paper, a CSV file: value and 95 % of each log; of several, n, mean, next press
-    and deviation, too."""
+    """Where to write a table for a paper, a CSV file: value and 95 % interval of each log; for several logs also
+    their number, mean, next press and standard deviation."""
     verbose: Annotated[bool, FLAG] = False
     "Print all evidence: each reason, each warning, the slopes of the press."
     budget: Annotated[bool, FLAG] = False

@@ -37,12 +37,12 @@ MAX_GAP = 1e3
 ROUND = (2, 4)
 """Geom types that touch a plane with one point: mjGEOM_SPHERE, mjGEOM_ELLIPSOID."""
 BODIES_NOTE = (
-    "K and B begin at the touch, whatever margin the scene had; R was read off MuJoCo with the contact, and is that"
-    " of these two bodies: export again when their masses change"
+    "the force begins at the touch, whatever margin the scene had; the constraint's softness R was measured in MuJoCo"
+    " and belongs to these two bodies: export again when their masses change"
 )
 FRICTION_NOTE = (
-    "in a contact as soft as this, MuJoCo's friction below its limit is a damper: a body at rest on a slope creeps; and"
-    " where the probe slides, its cone lets friction into the normal force"
+    "in a soft contact, MuJoCo's friction below its limit is a damper: a body at rest on a slope creeps; when the probe"
+    " slides, MuJoCo's cone couples friction into the normal force"
 )
 
 

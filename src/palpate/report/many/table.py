@@ -80,7 +80,7 @@ def sentence(rows: Sequence[LogRow], pooled: Pooled) -> str:
     stiffness = point.stiffness.parameter
     where = place(rows, point)
     if stiffness.value is None:
-        return f"The {len(rows)} logs show no stiffness together {where}: {stiffness.reason}."
+        return f"The {len(rows)} logs have no common stiffness {where}: {stiffness.reason}."
     limit = cause_of(next(iter(stiffness.budget), None))
     next_press = point.stiffness.prediction95
     changes = [p for p in point.stiffness.slopes.values() if p.value is not None]
