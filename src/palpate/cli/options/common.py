@@ -209,6 +209,11 @@ class PluginOptions:
     """Import and run the code that the file names, kind = "module:Class", with your rights. Without it, a
     question is asked at a terminal; elsewhere such a file is refused."""
 
+    @property
+    def words(self) -> str:
+        """The option as it is typed behind a command, with a space; empty if it is not given."""
+        return " --plugins" if self.plugins else ""
+
     @contextmanager
     def consent(self, given: str = "") -> Iterator[None]:
         """Within the block, names of code are imported if the user agrees.

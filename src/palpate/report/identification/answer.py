@@ -50,16 +50,6 @@ _REMEDIES = {
     "Poisson's ratio": "--poisson",
 }
 """Remedies by cause, in a few letters; --verbose has them in full."""
-_CAUSES = {
-    "other forces": "drift or friction",
-    "blocks": "parts of the log differ",
-    "repetition": "parts of the log differ",
-    "loadings": "loadings differ",
-    "octaves": "frequencies differ",
-    "touch": "the touch",
-    "unseen way": "the first reading",
-}
-"""Causes whose names in a budget need an explanation."""
 _PARTS = {
     "kelvin-voigt": "Spring and damper",
     "kelvin-voigt-mass": "Spring, damper and mass",
@@ -278,7 +268,7 @@ def _cells(name: str, p: Parameter, result: Identification) -> list[Text]:
     limit = (
         f"lag, ± {plain(1e3 * _lag_half(result), 2)} ms"
         if cause == "lag" and result.lag
-        else _CAUSES.get(cause, cause)
+        else words.CAUSES.get(cause, cause)
     )
     remedy = "--robot-stiffness" if bound else _REMEDIES.get(cause, "")
     if p.verdict is not Verdict.NOT_IDENTIFIABLE:
