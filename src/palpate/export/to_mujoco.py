@@ -238,7 +238,7 @@ class MuJoCoScene:
         elif pair.points > 1:
             how = f"touches with {pair.points} points, which share K and B: correct while all of them touch"
         else:
-            how = "touched with one point, which has all of K and B: each more would add as much"
+            how = "touched at one point, which carries all of K and B: a second one would double them"
         return [] if pair.points == 1 and is_round else [f"{pair.probe!r} {how}"]
 
     def xml(self, pairs: Sequence[GeomPair], contact: Contact, folder: Path) -> str:
