@@ -157,7 +157,8 @@ def notes(rows: Sequence[LogRow], pooled: Pooled) -> list[str]:
 
 def faults(rows: Sequence[LogRow]) -> list[str]:
     """Number of logs that could not be identified, and the reason of each."""
-    errors = [f"Not identified: {row.source.title}: {row.error}" for row in rows if row.result is None]
+    refused = [(row.source.title, row.error) for row in rows if row.result is None]
+    errors = [f"Not identified: {why if name in why else f'{name}: {why}'}" for name, why in refused]
     return [failures(rows), *errors] if errors else []
 
 
