@@ -82,7 +82,9 @@ class OthersOptions:
         """Refuse what belongs to --controller where no controller is named."""
         for name in ("delay", "mass"):
             if getattr(self, name) is not None:
-                raise InputError(f"--{name} is of --controller; the gains file of palpate tune has its own")
+                raise InputError(
+                    f"--{name} belongs to --controller; a gains file of palpate tune states its own"
+                )
 
 
 def certify(
@@ -146,7 +148,7 @@ def _judge_controller(
     for name in ("damping_time", "loop_from"):
         if getattr(proof, name) is not None:
             raise InputError(
-                f"--{name.replace('_', '-')} is of tuned gains; --controller takes springs and --delay"
+                f"--{name.replace('_', '-')} belongs to tuned gains; leave it out with --controller"
             )
     request = ControllerRequest(
         controller=str(foreign.controller),

@@ -424,7 +424,7 @@ def _identify(
     logs = formats.sheets_as_logs(logs, log_options.source.names, log_options.source.limits)
     if len(logs) == 1 and not formats.is_folder_of_logs(logs[0]):
         if beside != CovariateOptions():
-            raise InputError("--covariate is of several logs; name more than one, or a folder of them")
+            raise InputError("--covariate needs several logs; name more than one, or a folder of them")
         return _one(formats.log_of(logs[0]), log_options, output)
     if output.budget:
         raise InputError("--budget prints the budget of one log; --json has those of many")

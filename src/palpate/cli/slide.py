@@ -214,9 +214,7 @@ class SlideOptions(SlideLimits):
             if self.has_no_joints and load_arm(self.arm).title != gains.arm.title:
                 fixed.add("arm")
             for name in sorted(fixed & options_given((self,)).keys()):
-                raise InputError(
-                    f"--{name} is of the gains, and {self.gains} has its own; leave it out, or tune again"
-                )
+                raise InputError(f"--{name} is set by {self.gains}; leave it out, or tune again")
             return gains if self.force is None else changed(gains, force=force)
         if not force > 0.0:
             raise InputError(f"--force must be above 0 N (pressing is positive), got {force:g} N")
