@@ -77,8 +77,7 @@ def page(result: Identification, source: words.Source) -> str:
         folds=_budget_folds(result),
         source=("The same as JSON", json.dumps(words.as_json(result, source), indent=1)),
     )
-    made = {"made": source.made} if source.made else {}
-    return answer_page(answer, room="identify", command=source.command, origin=origin, **made)
+    return answer_page(answer, room="identify", command=source.command, origin=origin, made=source.made)
 
 
 def facts(result: Identification, name: str) -> list[str]:
