@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from inspect import signature
 from numbers import Real
 from pathlib import Path
@@ -94,19 +95,24 @@ def identify(
     options = {name: value for name, value in given.items() if value is not None} | columns
     with _in_python():
         if isinstance(source, str | Path) and not {*options} - _OPTIONS:
-            return identify_log_file(source, **_split(options, columns=True)[1])
+            return _named(identify_log_file(source, **_split(options, columns=True)[1]), source)
         reading, fitting = _split(options, columns=not isinstance(source, Record))
         if isinstance(source, Record):
             return _fit(source, fitting)
         record = read(source, **reading)
         specs = {role: reading.get(role) for role in ("position", "force")}
-        return accept_stated_units(_fit(record, fitting), record, specs)
+        return _named(accept_stated_units(_fit(record, fitting), record, specs), source)
+
+
+def _named(result: Identification, source: object) -> Identification:
+    """The result with its file's name for titles; of a table as it is."""
+    return replace(result, source=Path(source).name) if isinstance(source, str | Path) else result
 
 
 def identify_log(path: str | Path, **options: Any) -> Identification:
     """Do what `palpate identify` does with a file, in one call; options of `palpate.from_log.identify_log`."""
     with _in_python():
-        return identify_log_file(path, **options)
+        return _named(identify_log_file(path, **options), path)
 
 
 def identify_friction(

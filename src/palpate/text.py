@@ -36,7 +36,7 @@ _KEYWORDS = {name: name.replace("-", "_") for name in _NAMES.split()} | {
 }
 """Options of the command line, and the keywords of `palpate.identify` and `palpate.identify_log` for them."""
 OPTION = re.compile(
-    rf"(?<![\w-])--({'|'.join(sorted(_KEYWORDS, key=len, reverse=True))})(?![\w-])( [A-Z]+\b)?"
+    rf"(?<![\w-])--({'|'.join(sorted(_KEYWORDS, key=len, reverse=True))})(?![\w-])(?: (\w+):STD\b| [A-Z]+\b)?"
 )
 """An option of `palpate identify` in a sentence, with its value's name."""
 
@@ -51,9 +51,11 @@ def _call(words: list[str]) -> str:
 
 
 def in_python(text: str) -> str:
-    """Advice for the command line in Python's words: `--force-filter` is `force_filter=`, a whole command a call."""
+    """Advice for the command line in Python's words: `--lag 0:STD` is `lag=(0, STD)`, a whole command a call."""
     text = _COMMAND.sub(lambda match: _call(shlex.split(match[1])), text)
-    return OPTION.sub(lambda match: f"{_KEYWORDS[match[1]]}=", text)
+    return OPTION.sub(
+        lambda match: f"{_KEYWORDS[match[1]]}=" + (f"({match[2]}, STD)" if match[2] else ""), text
+    )
 
 
 def printable(text: str) -> str:

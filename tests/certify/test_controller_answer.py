@@ -216,7 +216,7 @@ def test_nothing_is_written_where_nothing_is_asked_or_a_file_is_refused(capsys):
 @pytest.mark.parametrize("option", [["--delay", "24:ms"], ["--mass", "3:kg"]])
 def test_options_of_another_controller_need_one(capsys, option):
     assert main(["certify", "gains.toml", *option]) == 2
-    assert f"{option[0]} is of --controller" in capsys.readouterr().err
+    assert f"{option[0]} belongs to --controller" in capsys.readouterr().err
     Path("a.yaml").write_text(ADMITTANCE)
     assert main([*COMMAND, "--damping-time", "0:1"]) == 2
-    assert "--damping-time is of tuned gains" in capsys.readouterr().err
+    assert "--damping-time belongs to tuned gains" in capsys.readouterr().err

@@ -112,7 +112,7 @@ def test_an_interruption_keeps_what_was_done(presses, capsys, monkeypatch):
         (["empty"], "holds no log"),
         (["presses", "--covariate", "temp"], "unknown column 'temp'"),
         (["presses", "--covariate", "time_s"], "time_s is the same in all 3 logs"),
-        (["presses/press_2.csv", "--covariate", "temp"], "--covariate is of several logs"),
+        (["presses/press_2.csv", "--covariate", "temp"], "--covariate needs several logs"),
     ],
 )
 def test_wrong_input_is_one_line_and_code_2(presses, capsys, words, pattern):

@@ -32,7 +32,7 @@ LINEAR = {name: make for name, make in MAKERS.items() if name != "network"}
 FED_OTHERWISE = {ContactIdentifier}
 """Estimators that take something else than a regressor: they have tests of their own."""
 
-OF_M_B_K = {laws.its_estimate_is_finite, laws.it_finds_the_foam}
+OF_M_B_K = {laws.estimate_is_finite, laws.stiffness_of_foam_is_found}
 """Laws of what estimates (M, B, K) in this order."""
 
 every = pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)

@@ -22,8 +22,18 @@ def test_a_parameter_says_number_interval_and_verdict(found):
     assert "5236 ± 61 N/m" in repr(found.working_point)
 
 
+def test_text_has_no_codes_of_a_terminal(found, monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")  # as a notebook's kernel does
+    assert "x1b" not in str(found)
+
+
+def test_text_is_titled_by_the_file(found):
+    assert str(found).splitlines()[0].endswith("press.csv")
+
+
 def test_advice_in_python_names_the_keyword(found):
     assert "lag=" in found._repr_html_()
+    assert "lag=(0, STD)" in str(found)
     for view in (found._repr_html_(), str(found), repr(found)):
         assert "--lag" not in view
         assert "--robot-stiffness" not in view

@@ -72,7 +72,7 @@ def test_the_first_line_of_the_page_is_the_answer(slid, tmp_path) -> None:
     [
         (
             ["--gains", "gains.toml", "--mu-max", "0.5"],
-            "--mu-max is of the gains, and gains.toml has its own",
+            "--mu-max is set by gains.toml",
         ),
         (["--gains", "gains.toml", "--arm", "fr3"], "--arm is of the gains"),
         (["--gains", "gains.toml", "--path", "line", "--length", "20:mm"], "ends after 0.67 s"),

@@ -53,14 +53,14 @@ class Silent(Push):
 
 
 def test_bad_controllers_are_caught():
-    assert failing(controller_checks(Remembers())[:4]) == {"a step keeps nothing on the part"}
-    assert failing(controller_checks(Silent())[:4]) >= {"it tells of itself"}
+    assert failing(controller_checks(Remembers())[:4]) == {"all memory is in the state"}
+    assert failing(controller_checks(Silent())[:4]) >= {"report trouble and rest fit the loop"}
 
 
 def test_a_surface_that_gives_energy_is_caught():
     active = Spring(5000.0, 100.0)._replace(damping=-20.0)
-    checks = [c for c in surface_checks(active) if c.law.__name__ == "it_is_passive"]
-    assert failing(checks) == {"it is passive"}
+    checks = [c for c in surface_checks(active) if c.law.__name__ == "surface_is_passive"]
+    assert failing(checks) == {"surface is passive"}
 
 
 class Takes(Normal):
@@ -70,7 +70,7 @@ class Takes(Normal):
 
 def test_bad_identifiers_are_caught():
     found = failing(identifier_checks(Takes))
-    assert {"it finds the foam", "a bad sample is refused and changes nothing"} <= found
+    assert {"stiffness of foam is found", "bad samples are refused without effect"} <= found
 
 
 def test_an_estimate_of_another_shape_is_caught():
@@ -79,7 +79,7 @@ def test_an_estimate_of_another_shape_is_caught():
             whole = super().estimate()
             return type(whole)(("B", "K"), whole.theta[1:], whole.covariance[1:, 1:], whole.samples)
 
-    assert "its estimate is finite" in failing(identifier_checks(partial(Two)))
+    assert "estimate is finite" in failing(identifier_checks(partial(Two)))
 
 
 def test_the_command_runs_them(capsys):

@@ -95,19 +95,17 @@ def once(self):
 
 
 BROKEN = {
-    "it_names_its_far_end_and_its_watchdog": broken(watchdog=""),
-    "its_readings_are_numbers_with_an_orientation": broken(
+    "title_and_watchdog_are_texts": broken(watchdog=""),
+    "readings_are_finite_with_an_orientation": broken(
         sense=lambda self, a, b: Resting.sense(self, a, b)._replace(quaternion=(0.0,) * 4)
     ),
-    "each_reading_is_a_fresh_one": broken(sense=lambda self, a, b: Resting.sense(self, a // 4e-3 * 4e-3, b)),
-    "readings_say_when_they_came": broken(sense=lambda self, a, b: Resting.sense(self, a, time.time())),
-    "its_clock_runs_as_this_computer_s": broken(sense=lambda self, a, b: Resting.sense(self, 1.2 * a, b)),
-    "a_read_that_may_not_wait_does_not": broken(read=late),
-    "a_command_of_no_speed_leaves_it_at_rest": broken(
-        write=lambda self, _: setattr(self, "z", self.z - 1e-4)
-    ),
-    "stop_and_close_may_be_called_again": broken(close=once),
-    "what_is_closed_gives_no_reading": broken(close=lambda self: None),
+    "readings_are_fresh": broken(sense=lambda self, a, b: Resting.sense(self, a // 4e-3 * 4e-3, b)),
+    "readings_have_arrival_times": broken(sense=lambda self, a, b: Resting.sense(self, a, time.time())),
+    "clock_agrees_with_this_computer": broken(sense=lambda self, a, b: Resting.sense(self, 1.2 * a, b)),
+    "read_without_waiting_returns_at_once": broken(read=late),
+    "zero_speed_keeps_the_arm_at_rest": broken(write=lambda self, _: setattr(self, "z", self.z - 1e-4)),
+    "stop_and_close_may_be_repeated": broken(close=once),
+    "closed_wire_gives_no_reading": broken(close=lambda self: None),
 }
 
 

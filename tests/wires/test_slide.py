@@ -15,6 +15,7 @@ from palpate.errors import InputError
 from palpate.force import ForceLoop, SlidingLoop, load_arm, load_gains
 from palpate.force.simulated_press import surface
 from palpate.force.slide_table import Slide
+from palpate.force.sliding.slide_domain import start_time
 from palpate.logs import read_record
 from palpate.wires import PressLimits, PressTask, Rows, check_order, press
 from palpate.wires.order import Path as SlidePath
@@ -175,7 +176,8 @@ def test_limits_without_a_wire_are_refused(here, capsys):
 def test_it_slides_over_the_protocol_of_a_simulated_arm(folder, here, capsys):
     with simulated_arm(folder) as network:
         assert main(words_of(folder, network.address, "--dry-run")) == 0
-        assert "while it slides along a back of 10 mm" in capsys.readouterr().out
+        start = f"{start_time(load_gains(folder / 'gains.toml')):.2g} s"
+        assert f"along a back of 10 mm, begun within {start} of the first" in capsys.readouterr().out
     with simulated_arm(folder, gap=0.006) as network:
         code = main(words_of(folder, network.address, "--yes", "--record", "rec", "--json"))
     told = json.loads(capsys.readouterr().out)

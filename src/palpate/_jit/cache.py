@@ -164,8 +164,12 @@ def sources_stamp(*files: Path) -> str:
 
     A kernel is stale when any file that it may call has changed, which Numba, left alone, does not see.
     """
+    return _digest(_sources(files))
+
+
+def _digest(sources: dict[Path, bytes]) -> str:
     digest = hashlib.sha256()
-    for file, source in sorted(_sources(files).items()):
+    for file, source in sorted(sources.items()):
         digest.update(str(file).encode() + b"\0" + source)
     return digest.hexdigest()
 
@@ -220,8 +224,9 @@ def stamp_of(function: Callable[..., Any], types_of_arguments: tuple[Any, ...]) 
     files = {home_of(x) for x in things} | beside
     if not all(f.is_file() for f in files):
         return None
-    own = (f for f in _sources(files) if PACKAGE in f.parents)
-    return None if any(f.stat().st_ctime > STARTED for f in own) else sources_stamp(*files)
+    sources = _sources(files)
+    own = (f for f in sources if PACKAGE in f.parents)
+    return None if any(f.stat().st_ctime > STARTED for f in own) else _digest(sources)
 
 
 def _foreign(thing: Any) -> bool:

@@ -19,6 +19,7 @@ from palpate.errors import InputError
 from palpate.force import ForceLoop
 from palpate.force.ceiling import check_same_force_max, reading_error
 from palpate.force.expected import press_time
+from palpate.force.sliding.slide_domain import start_time
 from palpate.press.engines import mass_note
 from palpate.press.free_stroke import MAX_STROKE, subtraction_notes
 from palpate.wires.at_rest import AtRest, check_at_rest, retune_for_noise, tool_notes
@@ -215,7 +216,12 @@ def _describe_plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
     )
     last = 1e3 * (gains.theta + gains.arm.tick)
     path = task.path
-    along = "" if path is None else f" while it slides along a {path.name} of {1e3 * path.length:.3g} mm"
+    along = (
+        ""
+        if path is None
+        else f" while it slides along a {path.name} of {1e3 * path.length:.3g} mm, begun within"
+        f" {start_time(gains):.2g} s of the first contact"
+    )
     back = f"goes back to free motion and {1e3 * task.retreat:g} mm, rests"
     stroke = (
         f"goes back {1e3 * order.stroke.length:.3g} mm and returns at {1e3 * order.stroke.speed:.3g} mm/s, "

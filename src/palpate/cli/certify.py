@@ -74,7 +74,7 @@ class OthersOptions:
     """ros2-admittance, fzi, crisp, franka or ur: the kind of controller whose YAML file is given. --stiffness names the
     surfaces on which it has to be stable, --rate its rate where the file has none. --out writes a corrected file."""
     delay: Time | None = None
-    """Everything that is late between a command and the force that it causes, such as 24:ms."""
+    """Total delay from a command to the reading of the force that it causes, as 24:ms."""
     mass: Mass | None = None
     """Mass of the arm at its tip along the axis, for a controller that gives torques."""
 
@@ -82,7 +82,9 @@ class OthersOptions:
         """Refuse what belongs to --controller where no controller is named."""
         for name in ("delay", "mass"):
             if getattr(self, name) is not None:
-                raise InputError(f"--{name} is of --controller; the gains file of palpate tune has its own")
+                raise InputError(
+                    f"--{name} belongs to --controller; a gains file of palpate tune states its own"
+                )
 
 
 def certify(
@@ -146,7 +148,7 @@ def _judge_controller(
     for name in ("damping_time", "loop_from"):
         if getattr(proof, name) is not None:
             raise InputError(
-                f"--{name.replace('_', '-')} is of tuned gains; --controller takes springs and --delay"
+                f"--{name.replace('_', '-')} belongs to tuned gains; leave it out with --controller"
             )
     request = ControllerRequest(
         controller=str(foreign.controller),

@@ -26,10 +26,9 @@ def checks(
     Parameters
     ----------
     name
-        Your part, module:Class, or an experiment's TOML file that names some; of a wire with ?WHERE behind it, its
-        robot switched on and at rest. The module is searched among the
-        installed ones, beside the file and in the current folder. Its name here imports it; a name in a file only with
-        --plugins.
+        module:Class of your part, or an experiment's TOML file that names parts. A wire is module:Class?ADDRESS, and
+        its robot must be on and at rest. The module is searched for among the installed ones, beside the file and in
+        the current folder. A name typed here is imported; a name in a file only with --plugins.
     """
     if name is None:
         raise InputError(

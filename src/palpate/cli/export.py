@@ -29,7 +29,7 @@ class SceneOptions:
     model: Path | None = None
     "The scene: MJCF for mujoco, SDF or URDF for drake."
     geom: str | None = None
-    "The surface: a geom of MJCF, a collision of SDF or URDF; without a scene, its name."
+    "The surface: a geom of MJCF, a collision of SDF or URDF; without a scene, a name for it."
     probe: str | None = None
     "The probe: a geom or a collision; every one that can touch the surface if not given."
 
@@ -65,7 +65,7 @@ class GivenOptions:
         )
 
 
-@options("The law, of C", 3)
+@options("A law in C", 3)
 class LawOptions:
     """A law and its numbers."""
 
@@ -104,7 +104,7 @@ def export(
     law: LawOptions | None = None,
     output: ExportOutput | None = None,
 ) -> int:
-    """Write an identified surface as the contact of a simulator's scene, and press it there; or a law as C.
+    """Write an identified surface as the contact of a simulator's scene, or a law in C.
 
     palpate identify press.csv --time time_s --position position_mm:mm --force force_N:N --json > found.json
 
@@ -146,7 +146,7 @@ def _tuned(identified: Path | None, parameters: GivenOptions, law: LawOptions) -
 
     if parameters.arm is None or law.force is None:
         raise InputError(
-            "a law in C is of gains for an arm and a force; add --arm and --force, as --force 15:N"
+            "a law in C needs gains for an arm and a force; add --arm and --force, as --force 15:N"
         )
     if parameters.stiffness is None:
         assert identified is not None

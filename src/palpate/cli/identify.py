@@ -257,8 +257,8 @@ class IdentifyOutput(ReportOption, FigureFile):
     dpi: int | None = None
     "Resolution of a PNG; 110 if not given."
     table: Path | None = None
-    """Where to write a table for a paper, a CSV file: value and 95 % of each log; of several, n, mean, next press
-    and deviation, too."""
+    """Where to write a table for a paper, a CSV file: value and 95 % interval of each log; for several logs also
+    their number, mean, next press and standard deviation."""
     verbose: Annotated[bool, FLAG] = False
     "Print all evidence: each reason, each warning, the slopes of the press."
     budget: Annotated[bool, FLAG] = False
@@ -424,7 +424,7 @@ def _identify(
     logs = formats.sheets_as_logs(logs, log_options.source.names, log_options.source.limits)
     if len(logs) == 1 and not formats.is_folder_of_logs(logs[0]):
         if beside != CovariateOptions():
-            raise InputError("--covariate is of several logs; name more than one, or a folder of them")
+            raise InputError("--covariate needs several logs; name more than one, or a folder of them")
         return _one(formats.log_of(logs[0]), log_options, output)
     if output.budget:
         raise InputError("--budget prints the budget of one log; --json has those of many")

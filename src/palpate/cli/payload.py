@@ -60,7 +60,7 @@ def payload(
     log
         A log of wrench and pose, as for palpate identify.
     tolerance
-        Largest half-width of the mass' 95 % interval, as a share of its value.
+        Largest half-width of the mass' 95 % interval, as a fraction of its value.
     """
     cell, output = cell or CellOptions(), output or PayloadOutput()
     cell.check()

@@ -28,8 +28,8 @@ def references(
 
     Args:
         action: `check` fits every log by palpate, SciPy and NumPy; `export` writes the logs.
-        out: folder for the logs of `export`.
-        json: print one JSON object.
+        out: Folder for the logs of `export`.
+        json: Print one JSON object.
 
     Returns:
         0 if palpate's search has 8 digits on every log from both starts, 1 if not.

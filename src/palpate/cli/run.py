@@ -66,12 +66,12 @@ def run(
     from palpate.bench.summary import DONE, INTERRUPTED
 
     figure_options.check()
-    with (plugins or common.PluginOptions()).consent():
+    plugins = plugins or common.PluginOptions()
+    with plugins.consent():
         experiment = parse(source, name)  # before a Ctrl-C is only noted, which a question would wait for
         with notice_signals() as interrupted:
-            ran = _run(
-                _RunRequest(name, source, experiment, seed), folder, output, figure_options, interrupted
-            )
+            request = _RunRequest(name, source, experiment, seed, plugins.words)
+            ran = _run(request, folder, output, figure_options, interrupted)
     # All is in its place, so that a reader of the output who has gone loses nothing.
     _show(ran, folder, output.json)
     if ran.undrawn:
@@ -94,12 +94,13 @@ class _Ran:
 
 @dataclass(frozen=True)
 class _RunRequest:
-    """The experiment to run: its name or file, the text of that, and its numbers; and the seed of the noise."""
+    """The experiment to run: its name or file, the text of that, and its numbers; the seed of the noise; --plugins."""
 
     name: str
     source: str
     experiment: Any
     seed: int
+    plugins: str
 
 
 def _run(
@@ -115,7 +116,8 @@ def _run(
     from palpate.report.run.figures import write_report
 
     with fresh_folder(folder, replace=output.replace) as fresh:
-        command = printable(f"palpate run {shlex.quote(request.name)} --seed {request.seed}")
+        typed = f"palpate run {shlex.quote(request.name)} --seed {request.seed}{request.plugins}"
+        command = printable(typed)
         record = _record(console(stderr=output.json), request, interrupted)
         record = replace(record, meta={**record.meta, "command": command})
         write_record(record, fresh / RECORD)

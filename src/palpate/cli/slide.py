@@ -67,15 +67,14 @@ class SlideOptions(SlideLimits):
     seconds: Annotated[float, SIGNED] = 8.0
     "Duration of the slide; a line ends at its --length, if that is earlier."
     normal: values.Direction | None = None
-    """Direction into the surface that is given to the law, x,y,z; the true one of a simulated surface is
-    0,0,-1."""
+    """Direction into the surface, x,y,z, as far as it is known; the true one of a simulated surface is 0,0,-1."""
     end: Annotated[Literal["retreat", "hold"], _REAL] = "retreat"
     "For a real arm. retreat: after the slide the tip goes back to free motion; hold: it rests in contact."
     turn: values.Length | None = None
     """Keep the tool perpendicular to the surface, in simulation: the distance from the tool's point back to the centre
     of its spherical tip, as 20:mm or 0:mm. A flat tool's moment is not covered."""
     payload: Path | None = None
-    "File of palpate payload, whose weight is taken off in every orientation of the tool; for --turn."
+    "File of palpate payload, for --turn: the weight is subtracted in every orientation of the tool."
     dither: Annotated[float, SIGNED, _SIMULATED] = 0.0
     """Fraction by which the force swings during the slide, as 0.1: the stiffness along the path goes to places.csv,
     which palpate map --table reads; 0 for none."""
@@ -215,9 +214,7 @@ class SlideOptions(SlideLimits):
             if self.has_no_joints and load_arm(self.arm).title != gains.arm.title:
                 fixed.add("arm")
             for name in sorted(fixed & options_given((self,)).keys()):
-                raise InputError(
-                    f"--{name} is of the gains, and {self.gains} has its own; leave it out, or tune again"
-                )
+                raise InputError(f"--{name} is set by {self.gains}; leave it out, or tune again")
             return gains if self.force is None else changed(gains, force=force)
         if not force > 0.0:
             raise InputError(f"--force must be above 0 N (pressing is positive), got {force:g} N")

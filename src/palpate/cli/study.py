@@ -103,9 +103,13 @@ def study(
     if name is None or source is None:
         return 0
     folder = output.out if output.out is not None else Path("runs") / f"study-{Path(name).stem}"
+    plugins = plugins or PluginOptions()
+    command = printable(f"palpate study {shlex.quote(name)}{plugins.words}")
     try:
-        with (plugins or PluginOptions()).consent():
-            findings = _run(name, source, folder, output.replace, where or ClusterOptions(), figure_options)
+        with plugins.consent():
+            findings = _run(
+                name, source, folder, output.replace, where or ClusterOptions(), figure_options, command
+            )
     except KeyboardInterrupt:
         say(f"interrupted; the finished runs are saved in {folder}; the same command resumes")
         return 130
@@ -114,7 +118,13 @@ def study(
 
 
 def _run(
-    name: str, source: str, folder: Path, replace: bool, where: ClusterOptions, figure_options: FigureOptions
+    name: str,
+    source: str,
+    folder: Path,
+    replace: bool,
+    where: ClusterOptions,
+    figure_options: FigureOptions,
+    command: str,
 ) -> Findings:
     """Do the missing runs, and write table, page and summary."""
     from palpate.studies.plan import plan_runs
@@ -133,7 +143,6 @@ def _run(
     with where.runner(waiting) as runner, progress_of_pieces(screen) as show:
         work = Work(planned, source, folder, runner, lambda done: show("runs", done, len(planned)))
         frame = work.run(replace=replace)
-    command = printable(f"palpate study {shlex.quote(name)}")
     guard = guard_picture(folder / PAGE)
     return present(frame, planned, folder, source, command, figure_options.endings, figure_options.dpi, guard)
 

@@ -40,8 +40,8 @@ _HYDROELASTIC = (
     "mesh_resolution_hint",
 )
 PLANT_NOTE = (
-    "for a discrete MultibodyPlant with contact_model point and discrete_contact_approximation sap; with others B is"
-    " not exported"
+    "this needs a discrete MultibodyPlant with contact_model point and discrete_contact_approximation sap; the other"
+    " approximations take no B"
 )
 
 

@@ -37,12 +37,12 @@ MAX_GAP = 1e3
 ROUND = (2, 4)
 """Geom types that touch a plane with one point: mjGEOM_SPHERE, mjGEOM_ELLIPSOID."""
 BODIES_NOTE = (
-    "K and B begin at the touch, whatever margin the scene had; R was read off MuJoCo with the contact, and is that"
-    " of these two bodies: export again when their masses change"
+    "the force begins at the touch, whatever margin the scene had; the constraint's softness R was measured in MuJoCo"
+    " and belongs to these two bodies: export again when their masses change"
 )
 FRICTION_NOTE = (
-    "in a contact as soft as this, MuJoCo's friction below its limit is a damper: a body at rest on a slope creeps; and"
-    " where the probe slides, its cone lets friction into the normal force"
+    "in a soft contact, MuJoCo's friction below its limit is a damper: a body at rest on a slope creeps; when the probe"
+    " slides, MuJoCo's cone couples friction into the normal force"
 )
 
 
@@ -238,7 +238,7 @@ class MuJoCoScene:
         elif pair.points > 1:
             how = f"touches with {pair.points} points, which share K and B: correct while all of them touch"
         else:
-            how = "touched with one point, which has all of K and B: each more would add as much"
+            how = "touched at one point, which carries all of K and B: a second one would double them"
         return [] if pair.points == 1 and is_round else [f"{pair.probe!r} {how}"]
 
     def xml(self, pairs: Sequence[GeomPair], contact: Contact, folder: Path) -> str:

@@ -11,10 +11,10 @@ from palpate.robots.serial.loading import mujoco, refusals
 HALF_SIZE = (0.05, 0.05, 0.005)
 """Half of the plate's size [m]."""
 JOINT_NOTE = (
-    "K and B are those of the plate's own displacement, the joint's; a probe sinks into the plate besides, as the"
-    " scene's contact has it"
+    "K and B hold for the displacement of the plate's joint; the probe also penetrates the plate, by the scene's"
+    " contact law"
 )
-PLACE_NOTE = "unpressed, the plate's upper side is at z = 0 and its joint at 0; it goes down as it is pressed"
+PLACE_NOTE = "at rest the plate's upper side is at z = 0 and its joint at 0; a press moves it down"
 
 
 def plate(contact: Contact, name: str) -> str:

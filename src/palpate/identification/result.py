@@ -256,6 +256,7 @@ class Identification(Result):
         inputs: input quantities of the uncertainties, by cause.
         correlation: of the estimates of K, B and M, each pair by its names.
         slide: where the tip slides; parameters are then mu and K.
+        source: name of the log, for titles.
     """
 
     model: str
@@ -277,6 +278,7 @@ class Identification(Result):
     inputs: dict[str, Input] = field(default_factory=dict, repr=False)
     correlation: dict[str, float] = field(default_factory=dict, repr=False)
     slide: SlideFound | None = field(default=None, repr=False)
+    source: str = field(default="a log", repr=False, compare=False)
 
     def __getattr__(self, name: str) -> Parameter:
         """A parameter by its name: `found.K`."""

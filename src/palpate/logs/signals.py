@@ -62,7 +62,7 @@ class Signals:
     missing: tuple[str, ...] = ()
     'A value that means "no reading", as -1; may be repeated. Common ones are detected.'
     join: Path | None = None
-    "A second log with further columns, as the forces of an arm's positions; both have a column of the same time."
+    "A second log with further columns, such as the forces; the time columns of both logs are of one clock."
     delimiter: str | None = None
     "Between two cells of a text log; detected if not given."
     max_size: float = GB

@@ -16,11 +16,15 @@ Panel = tuple[float, float, float, float]
 """Left, top, width and height of a part of the picture."""
 
 
+def touch_time(record: Record) -> float:
+    """Time of the first row in contact; of the first row if there is none [s]."""
+    return float(record["t"][np.argmax(record["phase"] == CONTACT)])
+
+
 def frame_rows(record: Record, before: float) -> Indices:
     """Rows evenly in time, from `before` seconds before the first contact to the end."""
-    t, pressing = record["t"], record["phase"] == CONTACT
-    touch = float(t[np.argmax(pressing)]) if pressing.any() else float(t[0])
-    start = max(float(t[0]), touch - before)
+    t = record["t"]
+    start = max(float(t[0]), touch_time(record) - before)
     return np.searchsorted(t, np.linspace(start, float(t[-1]), FRAMES)).clip(max=len(t) - 1)
 
 

@@ -138,8 +138,8 @@ def render(template: str, *packages: str, **values: Any) -> str:
         "styles": assets.styles(),
         "scripts": codes,
         "policy": assets.policy(codes),
-        "made": now,
         **values,
+        "made": values.get("made") or now,
     }
     folders = dict.fromkeys((*packages, "palpate.report"))
     loader = ChoiceLoader([PackageLoader(folder, "") for folder in folders])

@@ -64,7 +64,7 @@ def _components(number: Estimated) -> list[tuple[str, float, float]]:
 
 
 def _half(half: float) -> str:
-    return f"{half:.2g}" if np.isfinite(half) else "not told"
+    return f"{half:.2g}" if np.isfinite(half) else "not determined"
 
 
 def draw(weighed: Weighed) -> Figure:

@@ -14,7 +14,16 @@ from palpate.press.setting import Place
 from palpate.press.summary import PressRequest
 from palpate.records import Record
 from palpate.report.chart import KNOWN, Band, Chart, Series, panels
-from palpate.report.film import animation, coordinates, film_svg, fit_view, frame_rows, text, trace_panel
+from palpate.report.film import (
+    animation,
+    coordinates,
+    film_svg,
+    fit_view,
+    frame_rows,
+    text,
+    touch_time,
+    trace_panel,
+)
 from palpate.report.page import Answer, Table, answer_page, data_address, warning_alerts
 from palpate.report.run.table import alert_line, alerts, settling, surface_table
 from palpate.report.run.table import sentence as outcome
@@ -198,7 +207,7 @@ def _force_table(summary: dict[str, Any]) -> Table:
 def build_charts(record: Record, request: PressRequest) -> list[tuple[list[Chart], str]]:
     """Charts of a press, several in a figure, and their caption."""
     t, pressing = record["t"], record["phase"] == CONTACT
-    touch = float(t[np.argmax(pressing)]) if pressing.any() else float(t[0])
+    touch = touch_time(record)
     forces = [
         Series(t, record["force_sampled"], "measured", "reading", 0.7),
         Series(t, record["force"], "F", "true"),

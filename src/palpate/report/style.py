@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from hashlib import sha256
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,15 +44,14 @@ def rows_shown(values: Array, max_rows: int) -> Indices:
     n = len(values)
     if n <= max_rows:
         return np.arange(n)
-    edges = np.linspace(0, n, max(max_rows // 2, 1) + 1).astype(int)
-    rows = [0, n - 1]
-    for start, end in pairwise(edges):
-        piece = values[start:end]
-        if len(piece) and np.isfinite(piece).any():
-            rows += [start + int(np.nanargmin(piece)), start + int(np.nanargmax(piece))]
-        elif len(piece):
-            rows.append(start)
-    return np.unique(rows)
+    starts = np.linspace(0, n, max(max_rows // 2, 1) + 1).astype(int)[:-1]
+    stretch = np.repeat(np.arange(len(starts)), np.diff(starts, append=n))
+    rows = [np.array([0, n - 1])]
+    for extreme in (np.fmin, np.fmax):
+        ends = extreme.reduceat(values, starts)
+        reached = np.flatnonzero(values == ends[stretch])
+        rows += [reached[np.unique(stretch[reached], return_index=True)[1]], starts[np.isnan(ends)]]
+    return np.unique(np.concatenate(rows))
 
 
 def svg(drawing: Figure, *, signed: bool = False) -> bytes:

@@ -86,12 +86,13 @@ def answer_text(answer: Answer) -> str:
     from rich.console import Console
 
     file = StringIO()
-    # In a notebook's kernel, rich would show each line as an output of its own and write none into the file.
+    # In a notebook's kernel, rich would show each line as an output of its own and write none into the file; and
+    # FORCE_COLOR, which a kernel sets, would put codes for bold letters into it.
     console = Console(
         file=file,
         width=_NOTEBOOK_WIDTH,
         force_jupyter=False,
-        no_color=True,
+        force_terminal=False,
         markup=False,
         emoji=False,
         highlight=False,

@@ -76,9 +76,7 @@ def _force_max(tuning: Tuning) -> str:
     if price is None:
         return "none: a hard surface behind a soft layer is met at the arm's speed (--force-max bounds the force)"
     cost = f"{1e3 * gains.speed:.3g} mm/s, which costs {price[0]:.2g} s"
-    return (
-        f"at most {gains.force_max:g} N if something hard lies behind, by at most {cost}; {tuning.soft_press}"
-    )
+    return f"at most {gains.force_max:g} N even on a hard layer, as the speed is at most {cost}; {tuning.soft_press}"
 
 
 def build_answer(
@@ -196,9 +194,7 @@ def _slowest(tuning: Tuning) -> float:
     return max(step.settling for step in tuning.steps)
 
 
-_STABILITY = (
-    "Stiffness of the surface by itself. The dashed line is the stiffest surface that the gains are made for."
-)
+_STABILITY = "Stiffness of the surface alone. Dashed: the stiffest surface for which the gains are made."
 
 
 def _stability_chart(tuning: Tuning) -> Chart:
@@ -266,4 +262,6 @@ def touch_chart(tuning: Tuning) -> Chart:
 
 def _touch_caption(tuning: Tuning) -> str:
     over = 100.0 * float(np.max([tuning.overshoot, 0.0]))
-    return f"The first touch, its stiffness known: at most {plain(over, 2)} % over. Grey: within 5 % of the force."
+    return (
+        f"First touch, known stiffness: overshoot at most {plain(over, 2)} %. Grey: within 5 % of the force."
+    )

@@ -53,7 +53,7 @@ def ticks(controller: Any) -> tuple[Array, Any]:
     return np.array(torques), state
 
 
-def it_says_what_it_is(controller: Any) -> None:
+def class_has_a_docstring(controller: Any) -> None:
     """The class has a docstring of its own."""
     docstring = type(controller).__doc__ or ""
     require(
@@ -61,14 +61,14 @@ def it_says_what_it_is(controller: Any) -> None:
     )
 
 
-def its_torque_is_finite(controller: Any) -> None:
+def torque_is_finite(controller: Any) -> None:
     """The torque has three finite numbers at each tick."""
     torques, _ = ticks(controller)
     require(torques.shape[1:] == (3,), f"a torque has shape {torques.shape[1:]}, not (3,)")
     require(np.isfinite(torques).all(), f"the torques of its first ticks are {torques.tolist()}")
 
 
-def a_step_keeps_nothing_on_the_part(controller: Any) -> None:
+def all_memory_is_in_the_state(controller: Any) -> None:
     """Equal states and measurements give equal torques."""
     first, _ = ticks(controller)
     repeated, _ = ticks(controller)
@@ -77,7 +77,7 @@ def a_step_keeps_nothing_on_the_part(controller: Any) -> None:
     )
 
 
-def it_tells_of_itself(controller: Any) -> None:
+def report_trouble_and_rest_fit_the_loop(controller: Any) -> None:
     """``report``, ``trouble`` and ``rest`` return what the loop takes."""
     registered(type(controller))
     _, state = ticks(controller)
@@ -90,7 +90,7 @@ def it_tells_of_itself(controller: Any) -> None:
     )
 
 
-def it_runs_in_the_loop(controller: Any) -> None:
+def compiled_loop_agrees_with_python(controller: Any) -> None:
     """Compiled, in contact, and as plain Python does it, to the last bit; libm's own functions to 1e-9."""
     bench = _bench(controller)
     try:
@@ -106,7 +106,7 @@ def it_runs_in_the_loop(controller: Any) -> None:
         require(off <= 1e-9, f"{name} differs by {off:.2g} between compiled and plain Python")
 
 
-def it_starts_anew_with_each_run(controller: Any) -> None:
+def runs_with_one_seed_are_equal(controller: Any) -> None:
     """Two runs of one bench and one seed are one record."""
     bench = _bench(controller)
     first = bench.run(0.5, seed=2)
@@ -119,12 +119,12 @@ def _bench(controller: Any) -> Bench:
 
 
 LAWS = (
-    it_says_what_it_is,
-    its_torque_is_finite,
-    a_step_keeps_nothing_on_the_part,
-    it_tells_of_itself,
-    it_runs_in_the_loop,
-    it_starts_anew_with_each_run,
+    class_has_a_docstring,
+    torque_is_finite,
+    all_memory_is_in_the_state,
+    report_trouble_and_rest_fit_the_loop,
+    compiled_loop_agrees_with_python,
+    runs_with_one_seed_are_equal,
 )
 IN_PLAIN = LAWS[:4]
 """Checks that compile nothing."""

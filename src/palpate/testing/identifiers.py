@@ -75,7 +75,7 @@ def feed(identifier: Any, phi: Any, force: Any) -> Any:
     return identifier
 
 
-def its_estimate_is_finite(make: Callable[[], Any]) -> None:
+def estimate_is_finite(make: Callable[[], Any]) -> None:
     """Three parameters with a symmetric covariance, at any moment of a press."""
     identifier = make()
     for part in range(4):
@@ -89,7 +89,7 @@ def its_estimate_is_finite(make: Callable[[], Any]) -> None:
         require(np.isfinite(theta).all(), f"theta is {theta.tolist()}")
 
 
-def it_finds_the_foam(make: Callable[[], Any]) -> None:
+def stiffness_of_foam_is_found(make: Callable[[], Any]) -> None:
     """Two seconds of three tones identify the stiffness within a quarter."""
     phi, force = foam(2000)
     K = float(np.asarray(feed(make(), phi, force).estimate().theta)[2])
@@ -99,7 +99,7 @@ def it_finds_the_foam(make: Callable[[], Any]) -> None:
     )
 
 
-def many_updates_are_updates_one_by_one(make: Callable[[], Any]) -> None:
+def batch_update_equals_single_updates(make: Callable[[], Any]) -> None:
     """``update_many``, if there is one, equals repeated updates."""
     phi, force = foam(300)
     if not hasattr(make(), "update_many"):
@@ -118,7 +118,7 @@ def many_updates_are_updates_one_by_one(make: Callable[[], Any]) -> None:
     )
 
 
-def a_regressor_may_be_any_sequence_of_numbers(make: Callable[[], Any]) -> None:
+def regressor_may_be_any_sequence(make: Callable[[], Any]) -> None:
     """Lists, strided and read-only arrays, and whole numbers give one result."""
     phi = np.array([1.0, -2.0, 3.0])
     fixed = phi.copy()
@@ -135,7 +135,7 @@ def a_regressor_may_be_any_sequence_of_numbers(make: Callable[[], Any]) -> None:
         )
 
 
-def the_same_samples_give_the_same_estimate(make: Callable[[], Any]) -> None:
+def equal_samples_give_equal_estimates(make: Callable[[], Any]) -> None:
     """Two instances agree: no memory outside the instance, no random numbers."""
     phi, force = foam(200)
     first = feed(make(), phi, force)
@@ -143,7 +143,7 @@ def the_same_samples_give_the_same_estimate(make: Callable[[], Any]) -> None:
     require(_same(answers(first), answers(second)), "two instances differ after the same samples")
 
 
-def a_bad_sample_is_refused_and_changes_nothing(make: Callable[[], Any]) -> None:
+def bad_samples_are_refused_without_effect(make: Callable[[], Any]) -> None:
     """A bad sample raises a ValueError or TypeError and changes nothing."""
     for kind, sample in BAD.items():
         refuses(make, kind, sample)
@@ -164,7 +164,7 @@ def refuses(make: Callable[[], Any], kind: str, sample: tuple[Any, Any]) -> None
     require(same, f"a sample that is {kind} changes the state")
 
 
-def a_copy_goes_its_own_way_and_a_pickle_goes_on(make: Callable[[], Any]) -> None:
+def copy_and_pickle_keep_the_state(make: Callable[[], Any]) -> None:
     """Copies are independent, and a pickle continues where the original was."""
     phi, force = foam(200)
     identifier = feed(make(), phi[:100], force[:100])
@@ -178,7 +178,7 @@ def a_copy_goes_its_own_way_and_a_pickle_goes_on(make: Callable[[], Any]) -> Non
     )
 
 
-def nothing_is_identified_before_the_first_sample(make: Callable[[], Any]) -> None:
+def no_estimate_before_the_first_sample(make: Callable[[], Any]) -> None:
     """A start is a guess."""
     estimate = make().estimate()
     verdicts = set(estimate.verdicts().values())
@@ -187,12 +187,12 @@ def nothing_is_identified_before_the_first_sample(make: Callable[[], Any]) -> No
 
 
 LAWS = (
-    its_estimate_is_finite,
-    it_finds_the_foam,
-    many_updates_are_updates_one_by_one,
-    a_regressor_may_be_any_sequence_of_numbers,
-    the_same_samples_give_the_same_estimate,
-    a_bad_sample_is_refused_and_changes_nothing,
-    a_copy_goes_its_own_way_and_a_pickle_goes_on,
-    nothing_is_identified_before_the_first_sample,
+    estimate_is_finite,
+    stiffness_of_foam_is_found,
+    batch_update_equals_single_updates,
+    regressor_may_be_any_sequence,
+    equal_samples_give_equal_estimates,
+    bad_samples_are_refused_without_effect,
+    copy_and_pickle_keep_the_state,
+    no_estimate_before_the_first_sample,
 )

@@ -134,7 +134,7 @@ def never_pulls(surface: Any, tip_mass: float, speed: float, pushes: Sequence[fl
     require(np.all(energy >= -0.02 * through), f"it gives {-energy.min():.3g} J more than it received")
 
 
-def it_is_passive(surface: Any) -> None:
+def surface_is_passive(surface: Any) -> None:
     """The surface is passive on random closed paths."""
     for seed in _SEEDS:
         random = np.random.default_rng(seed)
@@ -146,7 +146,7 @@ def it_is_passive(surface: Any) -> None:
         )
 
 
-def it_never_pulls_and_gives_no_energy(surface: Any) -> None:
+def surface_never_pulls_or_adds_energy(surface: Any) -> None:
     """A surface under random pushes never pulls and gives no energy."""
     for seed in _SEEDS:
         random = np.random.default_rng(seed)
@@ -155,7 +155,7 @@ def it_never_pulls_and_gives_no_energy(surface: Any) -> None:
         never_pulls(surface, mass, speed, random.uniform(-30.0, 30.0, 8).tolist())
 
 
-def a_thrown_tip_comes_back_slower(surface: Any) -> None:
+def thrown_tip_returns_slower(surface: Any) -> None:
     """And not at all faster than it came."""
     for speed in (0.01, 0.2):
         out = np.empty((20000, 4))
@@ -166,7 +166,7 @@ def a_thrown_tip_comes_back_slower(surface: Any) -> None:
         require(abs(out[-1, 1]) <= speed * (1 + 2e-3), f"a tip rebounds at {-out[-1, 1]:.4g} m/s of {speed}")
 
 
-def no_step_is_too_long_when_it_is_free(surface: Any) -> None:
+def free_recovery_allows_any_step(surface: Any) -> None:
     """Steps of a millisecond to a quarter of an hour."""
     for dt in (1e-3, 1.0, 1e3):
         out = np.empty((200, 3))
@@ -175,7 +175,7 @@ def no_step_is_too_long_when_it_is_free(surface: Any) -> None:
         require(np.max(np.abs(out[:, 0])) <= 1e-3 * (1 + 1e-9), f"released, it grows in steps of {dt:g} s")
 
 
-def it_stays_at_rest_untouched(surface: Any) -> None:
+def untouched_surface_stays_at_rest(surface: Any) -> None:
     """Without contact it does not move."""
     state = surface.start()
     for _ in range(5):
@@ -183,7 +183,7 @@ def it_stays_at_rest_untouched(surface: Any) -> None:
     require(tuple(state) == (0.0, 0.0, 0.0, 0.0), f"without contact, it moves to {tuple(state)}")
 
 
-def compiled_it_is_as_in_plain_python(surface: Any) -> None:
+def compiled_surface_agrees_with_python(surface: Any) -> None:
     """Compiled, a surface gives the forces of plain Python bit for bit."""
     push = 15.0 * np.sin(np.arange(3000) * 0.004)
     plain = np.empty((3000, 4))
@@ -194,7 +194,7 @@ def compiled_it_is_as_in_plain_python(surface: Any) -> None:
     require(np.array_equal(plain, compiled), f"compiled it differs by {off:.2g} from plain Python")
 
 
-def its_truth_has_values_and_units(surface: Any) -> None:
+def truth_has_values_and_units(surface: Any) -> None:
     """The truth, if stated, has finite values with units."""
     if not hasattr(surface, "truth"):
         return
@@ -204,11 +204,11 @@ def its_truth_has_values_and_units(surface: Any) -> None:
 
 
 LAWS = (
-    it_stays_at_rest_untouched,
-    its_truth_has_values_and_units,
-    it_is_passive,
-    it_never_pulls_and_gives_no_energy,
-    a_thrown_tip_comes_back_slower,
-    no_step_is_too_long_when_it_is_free,
-    compiled_it_is_as_in_plain_python,
+    untouched_surface_stays_at_rest,
+    truth_has_values_and_units,
+    surface_is_passive,
+    surface_never_pulls_or_adds_energy,
+    thrown_tip_returns_slower,
+    free_recovery_allows_any_step,
+    compiled_surface_agrees_with_python,
 )

@@ -49,7 +49,7 @@ def _readings(wire: Any, count: int = _READINGS) -> list[ArmReading]:
     return readings
 
 
-def it_names_its_far_end_and_its_watchdog(make: Callable[[], Any]) -> None:
+def title_and_watchdog_are_texts(make: Callable[[], Any]) -> None:
     """`title` and `watchdog` are lines of text, for the plan of a press."""
     with _open(make) as wire:
         for name in ("title", "watchdog"):
@@ -60,7 +60,7 @@ def it_names_its_far_end_and_its_watchdog(make: Callable[[], Any]) -> None:
             )
 
 
-def its_readings_are_numbers_with_an_orientation(make: Callable[[], Any]) -> None:
+def readings_are_finite_with_an_orientation(make: Callable[[], Any]) -> None:
     """Finite numbers, and a quaternion of the length 1."""
     with _open(make) as wire:
         for sense in _readings(wire):
@@ -69,7 +69,7 @@ def its_readings_are_numbers_with_an_orientation(make: Callable[[], Any]) -> Non
             require(all(map(math.isfinite, sense.torque)), "the torque is no number")
 
 
-def each_reading_is_a_fresh_one(make: Callable[[], Any]) -> None:
+def readings_are_fresh(make: Callable[[], Any]) -> None:
     """The stamps grow from reading to reading."""
     with _open(make) as wire:
         stamps = [sense.stamp for sense in _readings(wire)]
@@ -78,7 +78,7 @@ def each_reading_is_a_fresh_one(make: Callable[[], Any]) -> None:
         )
 
 
-def readings_say_when_they_came(make: Callable[[], Any]) -> None:
+def readings_have_arrival_times(make: Callable[[], Any]) -> None:
     """`received` is of `time.monotonic`, and not of the future."""
     with _open(make) as wire:
         for _ in range(_READINGS):
@@ -91,7 +91,7 @@ def readings_say_when_they_came(make: Callable[[], Any]) -> None:
             )
 
 
-def its_clock_runs_as_this_computer_s(make: Callable[[], Any]) -> None:
+def clock_agrees_with_this_computer(make: Callable[[], Any]) -> None:
     """The stamps are seconds, in real time."""
     with _open(make) as wire:
         readings = _readings(wire)
@@ -104,7 +104,7 @@ def its_clock_runs_as_this_computer_s(make: Callable[[], Any]) -> None:
         )
 
 
-def a_read_that_may_not_wait_does_not(make: Callable[[], Any]) -> None:
+def read_without_waiting_returns_at_once(make: Callable[[], Any]) -> None:
     """A reading that is there, or a NoReadingError."""
     with _open(make) as wire:
         _readings(wire, 2)
@@ -118,7 +118,7 @@ def a_read_that_may_not_wait_does_not(make: Callable[[], Any]) -> None:
         )
 
 
-def a_command_of_no_speed_leaves_it_at_rest(make: Callable[[], Any]) -> None:
+def zero_speed_keeps_the_arm_at_rest(make: Callable[[], Any]) -> None:
     """After `begin`, the arm stays where it is."""
     with _open(make) as wire:
         wire.tare()
@@ -131,7 +131,7 @@ def a_command_of_no_speed_leaves_it_at_rest(make: Callable[[], Any]) -> None:
         wire.stop()
 
 
-def stop_and_close_may_be_called_again(make: Callable[[], Any]) -> None:
+def stop_and_close_may_be_repeated(make: Callable[[], Any]) -> None:
     """`stop` and `close` do not raise, before `begin` or after the end."""
     with _open(make) as wire:
         wire.stop()
@@ -140,7 +140,7 @@ def stop_and_close_may_be_called_again(make: Callable[[], Any]) -> None:
             end()
 
 
-def what_is_closed_gives_no_reading(make: Callable[[], Any]) -> None:
+def closed_wire_gives_no_reading(make: Callable[[], Any]) -> None:
     """A closed wire raises a ConnectionLostError."""
     with _open(make) as wire:
         _readings(wire, 1)
@@ -154,14 +154,14 @@ def what_is_closed_gives_no_reading(make: Callable[[], Any]) -> None:
 
 
 LAWS = (
-    it_names_its_far_end_and_its_watchdog,
-    its_readings_are_numbers_with_an_orientation,
-    each_reading_is_a_fresh_one,
-    readings_say_when_they_came,
-    its_clock_runs_as_this_computer_s,
-    a_read_that_may_not_wait_does_not,
-    a_command_of_no_speed_leaves_it_at_rest,
-    stop_and_close_may_be_called_again,
-    what_is_closed_gives_no_reading,
+    title_and_watchdog_are_texts,
+    readings_are_finite_with_an_orientation,
+    readings_are_fresh,
+    readings_have_arrival_times,
+    clock_agrees_with_this_computer,
+    read_without_waiting_returns_at_once,
+    zero_speed_keeps_the_arm_at_rest,
+    stop_and_close_may_be_repeated,
+    closed_wire_gives_no_reading,
 )
 """The laws; the name of each is its sentence."""

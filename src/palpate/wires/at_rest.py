@@ -193,7 +193,7 @@ def _check(rest: AtRest, distance: float, order: Order) -> None:
     lowest = task.force * (1.0 - task.probe)
     if SURE * rest.noise > lowest:
         raise InputError(
-            f"the force's noise is {rest.noise:.2g} N in free motion: {lowest:g} N is below 8 deviations of it"
+            f"the force's noise is {rest.noise:.2g} N in free motion: {lowest:g} N is below 8 standard deviations"
         )
     check_drift(rest.drift, rest.drift_std, task.force, limits.seconds, gains.arm.sensor)
 

@@ -209,6 +209,11 @@ class PluginOptions:
     """Import and run the code that the file names, kind = "module:Class", with your rights. Without it, a
     question is asked at a terminal; elsewhere such a file is refused."""
 
+    @property
+    def words(self) -> str:
+        """The option as it is typed behind a command, with a space; empty if it is not given."""
+        return " --plugins" if self.plugins else ""
+
     @contextmanager
     def consent(self, given: str = "") -> Iterator[None]:
         """Within the block, names of code are imported if the user agrees.
@@ -264,12 +269,12 @@ class CellOptions:
     """Options saved in a file."""
 
     options: Path | None = None
-    'A TOML file of options of palpate identify, as wrench-frame = "tool"; the command line overrides it.'
+    'A TOML file with options of this command, such as wrench-frame = "tool"; the command line overrides it.'
     preset: Annotated[Preset | None, QUIET] = None
     """ur-rtde, franka or ros2: the columns or topics, units and frames of these drivers; --options overrides
     it."""
     save_options: Path | None = None
-    "Where to write the options of log, frame, arm and model, for --options."
+    "TOML file to write the typed options to, for a later --options."
 
     def check(self) -> None:
         """Check the path before any work is done."""

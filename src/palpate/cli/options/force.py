@@ -61,8 +61,8 @@ class PressOptions:
     force: values.Force
     "Desired force, N; the smallest one if it varies."
     force_max: values.Force | None = None
-    """Highest force that there may be, on layers and after a false touch, N: it limits the speed. Five times the force
-    if not given, and at most what the sensor reads; none for a slide."""
+    """F_max, N: the force that is not exceeded, on layers and after a false touch, too. It limits the speed. Five times
+    the force if not given, and at most what the sensor reads; none for a slide."""
 
     def highest_force(self, arm: Arm, *, slides: bool) -> float | None:
         """F_max, as given or as usual, in newtons; None for a slide."""
@@ -78,7 +78,7 @@ class SlideLimits:
     """Numbers that every slide has, in palpate tune --slide and in palpate slide."""
 
     mu_max: Annotated[float, SIGNED] = 0.9
-    "Largest friction coefficient that there may be."
+    "Upper bound of the friction coefficient."
     speed: values.Velocity = values.quantity_default("30:mm/s", "velocity")
     "Speed along the surface, as 30:mm/s."
     tilt: Annotated[float, SIGNED] = 7.0

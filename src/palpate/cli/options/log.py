@@ -212,7 +212,7 @@ class ModelOptions:
     mass: str | None = None
     "Prior of the mass, in kg, VALUE or VALUE:STD."
     tolerance: float = 0.25
-    "Largest half-width of an identified parameter's 95 % interval, as a share of its value."
+    "Largest half-width of an identified parameter's 95 % interval, as a fraction of its value."
     calibration: float = 0.0
     "Relative standard deviation of the scales of force and position together, as 0.01."
     bonded: bool | None = None

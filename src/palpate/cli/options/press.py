@@ -81,7 +81,7 @@ class SimulatedOptions:
     """The surface: K=5000,B=50 in N/m and N s/m, and M=0.1 in kg if it has a mass; a layer on something hard:
     K=500,thickness=20:mm,behind=1e5."""
     free_force: str | None = None
-    """Force that the sensor shows in free motion: a cable that pulls at the tool, a ripple of the pose, as
+    """Simulated force in free motion, by a cable that pulls at the tool and a ripple over the position:
     cable=20:N/m,ripple=1.5:N,wave=60:mm."""
     site: str | None = None
     "The tip in the file: a site or a body of MJCF, a link of URDF."
@@ -208,7 +208,7 @@ class WireOptions:
     retreat: values.Length | None = None
     "Clearance of the retreat from the surface; 2 mm if left out, or the travel limit if that is shorter."
     free_stroke: values.Length | None = None
-    """Way of a stroke before the press, away from the surface and back, that learns how the force in free motion
+    """Length of a stroke away from the surface and back before the press. It measures how the force in free motion
     changes with the position; 0 for none. If left out, 20 mm, or 0.9 of the travel limit if that is shorter."""
     ordinary_priority: Annotated[bool, FLAG] = False
     "Do not request real-time priority from the system."

@@ -4,6 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import groupby
 from pathlib import Path
 
@@ -68,7 +69,7 @@ def find_layout(
     Args:
         path: of the log.
         lines: its first.
-        budget: of it; the time is looked at again and again.
+        budget: of it.
         delimiter: between two cells; found when None.
 
     Raises:
@@ -79,7 +80,8 @@ def find_layout(
     plain = [line for line in lines if not line.comment]
     if not plain:
         raise InputError(f"{path} is empty; give a log with a row of numbers for each sample")
-    block = _find_block(plain, budget, delimiter)
+    block = _find_block(tuple(plain), delimiter)
+    budget.take(0)
     if block is None:
         if delimiter is not None:
             separator = _NAMES.get(delimiter, repr(delimiter))
@@ -115,22 +117,20 @@ class _Block:
     quoted: bool
 
 
-def _find_block(lines: Sequence[TextLine], budget: ReadingBudget, delimiter: str | None) -> _Block | None:
+@lru_cache(maxsize=1)
+def _find_block(lines: tuple[TextLine, ...], delimiter: str | None) -> _Block | None:
+    """The rows of numbers in the dialect that suits best; the last answer is kept, as a log is opened several times."""
     tried = [p for p in _DIALECTS if delimiter in {None, p.delimiter}]
     if not tried and delimiter is not None:
         tried = [Dialect(delimiter), Dialect(delimiter, decimal_comma=delimiter != ",")]
-    blocks = [
-        block for block in (_longest_block(lines, dialect, budget) for dialect in tried) if block is not None
-    ]
+    blocks = [block for block in (_longest_block(lines, dialect) for dialect in tried) if block is not None]
     return max(blocks, key=lambda block: block.score, default=None)
 
 
-def _longest_block(lines: Sequence[TextLine], dialect: Dialect, budget: ReadingBudget) -> _Block | None:
+def _longest_block(lines: Sequence[TextLine], dialect: Dialect) -> _Block | None:
     """The rows of numbers in one dialect: the longest run of lines of one width that hold some."""
     cells = [dialect.split(line.text) for line in lines]
-    budget.take(0)
     kinds = dialect.kinds(cells)
-    budget.take(0)
     runs = [
         (width, list(group))
         for width, group in groupby(range(len(lines)), lambda i: len(kinds[i]) if 1 in kinds[i] else 0)

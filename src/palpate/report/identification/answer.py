@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from math import hypot, sqrt
 from typing import TYPE_CHECKING
 
@@ -26,8 +25,6 @@ from palpate.units import NONE, plain, quantity, with_half
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_PYTHON = words.Source("a record", command="palpate.identify(...).report(...)")
-"""Source of an identification that was made in Python."""
 MAX_LINES = 14
 """Lines of an answer at most, to fit on a small terminal."""
 _BOUND = Text("! lower bound", style="yellow")
@@ -50,16 +47,6 @@ _REMEDIES = {
     "Poisson's ratio": "--poisson",
 }
 """Remedies by cause, in a few letters; --verbose has them in full."""
-_CAUSES = {
-    "other forces": "drift or friction",
-    "blocks": "parts of the log differ",
-    "repetition": "parts of the log differ",
-    "loadings": "loadings differ",
-    "octaves": "frequencies differ",
-    "touch": "the touch",
-    "unseen way": "the first reading",
-}
-"""Causes whose names in a budget need an explanation."""
 _PARTS = {
     "kelvin-voigt": "Spring and damper",
     "kelvin-voigt-mass": "Spring, damper and mass",
@@ -99,7 +86,7 @@ def show(
 
 def build_answer(
     result: Identification,
-    source: words.Source = _PYTHON,
+    source: words.Source | None = None,
     evidence_options: str = "",
     *,
     verbose: bool = False,
@@ -109,11 +96,12 @@ def build_answer(
 
     Args:
         result: what the log gives.
-        source: the log.
+        source: the log; by default as Python knows it.
         evidence_options: options by which all evidence is shown.
         verbose: whether all evidence is printed.
         budget: whether the uncertainty budgets are.
     """
+    source = source or _python_source(result)
     budgets = budget_tables(result) if budget else []
     budget_remarks = budget_notes(result) if budget else []
 
@@ -278,7 +266,7 @@ def _cells(name: str, p: Parameter, result: Identification) -> list[Text]:
     limit = (
         f"lag, ± {plain(1e3 * _lag_half(result), 2)} ms"
         if cause == "lag" and result.lag
-        else _CAUSES.get(cause, cause)
+        else words.CAUSES.get(cause, cause)
     )
     remedy = "--robot-stiffness" if bound else _REMEDIES.get(cause, "")
     if p.verdict is not Verdict.NOT_IDENTIFIABLE:
@@ -376,9 +364,13 @@ def draw(result: Identification) -> Figure:
         raise InputError(
             "this identification holds no traces, as many logs' do not; identify its log alone to draw it"
         )
-    return pages.draw(result, _PYTHON.title)
+    return pages.draw(result, result.source)
 
 
 def page(result: Identification) -> str:
     """The page of `palpate identify --report`."""
-    return pages.page(result, replace(_PYTHON, options=dict(result.options)))
+    return pages.page(result, _python_source(result))
+
+
+def _python_source(result: Identification) -> words.Source:
+    return words.Source(result.source, dict(result.options), command="palpate.identify(...).report(...)")

@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _EVIDENCE = (
-    "Force over position, whatever the model. Flat storage and loss in proportion to frequency are a spring beside a"
-    " damper; storage that falls with the square of the frequency is a mass."
+    "Force over position, without a model. A flat storage and a loss proportional to the frequency mean a spring and a"
+    " damper in parallel; a storage that falls with the square of the frequency means a mass."
 )
 _MAX_CONTACTS = 6
 """Contacts that a line names."""
-_MISFIT = "Noise looks the same all along the misfit. Waves, steps or repeated shapes are forces that the model lacks."
+_MISFIT = "Noise looks the same everywhere. Waves, steps or repeated shapes are forces that the model lacks."
 
 
 def write_figure(result: Identification, path: Path, title: str, dpi: int | None = None) -> Path:
@@ -77,8 +77,7 @@ def page(result: Identification, source: words.Source) -> str:
         folds=_budget_folds(result),
         source=("The same as JSON", json.dumps(words.as_json(result, source), indent=1)),
     )
-    made = {"made": source.made} if source.made else {}
-    return answer_page(answer, room="identify", command=source.command, origin=origin, **made)
+    return answer_page(answer, room="identify", command=source.command, origin=origin, made=source.made)
 
 
 def facts(result: Identification, name: str) -> list[str]:
@@ -134,7 +133,7 @@ def _model_table(result: Identification) -> Table:
     for tried in result.comparison:
         chosen = math.isclose(tried.rmse, result.rmse, rel_tol=1e-9)
         name = f"{result.model} (chosen)" if chosen else tried.model  # its mass may have been taken out since
-        note = printable(tried.note) or ("the plainest that the log allows" if chosen else "")
+        note = printable(tried.note) or ("the simplest that the log supports" if chosen else "")
         rows.append((name, f"{tried.r2:.4f}", plain(tried.rmse, 3), note))
     misfit = axis_label("rms misfit", words.force_and_depth_units(result)[0])
     return Table("Models compared", ("model", "R²", misfit, "why, or why not"), rows)

@@ -35,7 +35,7 @@ NO_NUMBER = "no number"
 ADVICE = {
     Code.PAYLOAD_DOUBTFUL: "Weigh the tool again with palpate payload; tare the sensor in free motion before a press.",
     Code.FORCE_LAGS_POSITION: "Measure the lag, by a knock on something stiff or with a known mass, and give --lag.",
-    Code.LAG_DAMPING_CONFOUNDED: "Give a measured --lag, or press again with a wider band, as a chirp has it.",
+    Code.LAG_DAMPING_CONFOUNDED: "Give a measured --lag, or press again with more frequencies, such as a chirp.",
     Code.SERIES_COMPLIANCE: "Measure the position nearer to the surface, or calibrate what lies between more closely.",
     Code.LOW_EXCITATION: "Press faster, deeper or more often; for a mass, shake the probe in contact.",
     Code.NONLINEAR_STIFFNESS: "Use K only near the mean position.",
@@ -69,6 +69,16 @@ ADVICE = {
 """The remedy of a warning."""
 
 UNTOUCHED = "Nothing is touched in this log"
+CAUSES = {
+    "other forces": "drift or friction",
+    "blocks": "parts of the log differ",
+    "repetition": "parts of the log differ",
+    "loadings": "loadings differ",
+    "octaves": "frequencies differ",
+    "touch": "the touch",
+    "unseen way": "the first reading",
+}
+"""Causes whose names in a budget need an explanation."""
 FLOWS = "What is touched flows: its force follows the speed and is gone at rest, so it has no stiffness."
 
 

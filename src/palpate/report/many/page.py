@@ -117,8 +117,7 @@ def page_of_logs(rows: Sequence[table.LogRow], pooled: Pooled) -> str:
         folds=[("sha256 of each log", "", [(row.source.title, row.source.sha256 or NONE) for row in rows])],
         source=("The same as JSON", json.dumps(table.pooled_json(rows, pooled), indent=1)),
     )
-    made = {"made": source.made} if source.made else {}
-    return answer_page(answer, room="identify", command=source.command, **made)
+    return answer_page(answer, room="identify", command=source.command, made=source.made)
 
 
 def line(pooled: Pooled) -> str:

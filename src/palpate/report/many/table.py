@@ -80,7 +80,7 @@ def sentence(rows: Sequence[LogRow], pooled: Pooled) -> str:
     stiffness = point.stiffness.parameter
     where = place(rows, point)
     if stiffness.value is None:
-        return f"The {len(rows)} logs show no stiffness together {where}: {stiffness.reason}."
+        return f"The {len(rows)} logs have no common stiffness {where}: {stiffness.reason}."
     limit = cause_of(next(iter(stiffness.budget), None))
     next_press = point.stiffness.prediction95
     changes = [p for p in point.stiffness.slopes.values() if p.value is not None]
@@ -157,7 +157,8 @@ def notes(rows: Sequence[LogRow], pooled: Pooled) -> list[str]:
 
 def faults(rows: Sequence[LogRow]) -> list[str]:
     """Number of logs that could not be identified, and the reason of each."""
-    errors = [f"{row.source.title}: {row.error}" for row in rows if row.result is None]
+    refused = [(row.source.title, row.error) for row in rows if row.result is None]
+    errors = [f"Not identified: {why if name in why else f'{name}: {why}'}" for name, why in refused]
     return [failures(rows), *errors] if errors else []
 
 

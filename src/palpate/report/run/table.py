@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from palpate.identification.result import Identification
-from palpate.report.identification.words import CALLED
+from palpate.report.identification.words import CALLED, CAUSES
 from palpate.report.page import Answer, Table
 from palpate.signals.types import NORMAL
 from palpate.units import NONE, plain, quantity, with_half
@@ -27,7 +27,7 @@ def sentence(summary: dict[str, Any]) -> str:
         side = "below" if force["error_N"] < 0 else "above"
         outcome = (
             f"The force settled within 5 % in {plain(force['settling_s'], 3)} s and ended "
-            f"{abs(force['error_N']):.2f} N {side} the {desired} N asked for"
+            f"{abs(force['error_N']):.2f} N {side} the desired {desired} N"
         ) + (f", where it {ring}" if ring else "")
     elif force["overshoot_N"] is None:
         outcome = f"The force had an error of {plain(force['rms_error_N'], 2)} N (RMS) since contact"
@@ -142,7 +142,7 @@ def force_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ("settling to 5 %", settling(f)),
         ("overshoot", NONE if f["overshoot_N"] is None else f"{f['overshoot_N']:.2f} N"),
         ("noise of the measured force", f"{f['measured_std_N']:.3f} N"),
-        ("tip off in y", f"{tip['y_error_mm']:+.2f} mm"),
+        ("error of the tip in y", f"{tip['y_error_mm']:+.2f} mm"),
         ("angular error of the tip", f"{tip['phi_error_deg']:+.2f}°"),
     ]
 
@@ -157,7 +157,8 @@ def surface_table(title: str, parameters: Mapping[str, Any], truth: Mapping[str,
         number = "no number" if p["value"] is None else quantity(p["value"], p["unit"], (high - low) / 2)
         known = quantity(truth[name]["value"], p["unit"], digits=4) if name in truth else NONE
         called = f"{name}, {CALLED[name]}" if name in CALLED else name
-        rows.append((called, number, p["verdict"], next(iter(p["budget"]), NONE), known))
+        cause = next(iter(p["budget"]), NONE)
+        rows.append((called, number, p["verdict"], CAUSES.get(cause, cause), known))
     return Table(title, ("", "95 %", "verdict", "limited by", "truth"), rows)
 
 

@@ -205,7 +205,7 @@ def _pair(front: str, parameter: str, unit: str) -> tuple[Metric, Metric]:
         Metric(
             f"{parameter}_error_{name}",
             "1",
-            "its error, as a share of the truth",
+            f"error of {parameter}, as a fraction of the truth",
             error(front, parameter),
             signed=True,
         ),
