@@ -133,14 +133,6 @@ def read_blocks(source: str, function: str) -> dict[str, Block]:
     return reader.blocks
 
 
-def values_written(module: ModuleType, function: str) -> list[str]:
-    """Right-hand sides that a function assigns, in their order: ``["x.x", "x.y"]``."""
-    tree = ast.parse(inspect.getsource(module))
-    body = next(n.body for n in tree.body if isinstance(n, ast.FunctionDef) and n.name == function)
-    values = [statement.value for statement in body if isinstance(statement, ast.Assign)]
-    return [ast.unparse(part) for v in values for part in (v.elts if isinstance(v, ast.Tuple) else [v])]
-
-
 def blocks_of(module: ModuleType, function: str) -> dict[str, Block]:
     """Blocks of a function of the program; one that names no equation has that of the law that it calls."""
     blocks = read_blocks(inspect.getsource(module), function)

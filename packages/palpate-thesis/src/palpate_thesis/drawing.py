@@ -1,6 +1,6 @@
 """One look for all figures: sizes, colours and frames, and the panels that figures are made of."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -10,24 +10,12 @@ from palpate.records import Record
 from palpate.report import style
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib import axes, figure
+
+    Axes = axes.Axes
+    Figure = figure.Figure
 else:  # for annotations alone: matplotlib is imported when a figure is drawn
     Axes = Figure = Any
-
-__all__ = [
-    "LIMIT_LINE",
-    "STATED",
-    "ZERO",
-    "Axes",
-    "Figure",
-    "apply_look",
-    "force_figure",
-    "legend_inside",
-    "limits",
-    "panels",
-    "strip",
-]
 
 LIMIT_LINE: dict[str, Any] = {"color": style.INK, "linewidth": 1, "linestyle": "--"}
 STATED: dict[str, Any] = {"color": style.FAIL, "linewidth": 0.9, "linestyle": ":"}
@@ -81,16 +69,6 @@ def force_figure(shown: Record) -> Figure:
     axis.set(ylabel="force [N]", xlabel="time since contact [s]", xlim=(t[0], t[-1]))
     style.legend(axis)
     return drawing
-
-
-def strip(axis: Axes, values: Mapping[str, Sequence[float]], label: str, limit: float | None = None) -> None:
-    """A dot a run for each variation, and the limit of a claim."""
-    for place, runs in enumerate(values.values()):
-        axis.plot([place] * len(runs), runs, "o", color=style.SERIES[0], markersize=4)
-    if limit is not None:
-        axis.axhline(limit, **LIMIT_LINE)
-    axis.set_xticks(range(len(values)), list(values))
-    axis.set(ylabel=label, ylim=(0.0, None))
 
 
 def limits(axis: Axes, shown: Record) -> None:

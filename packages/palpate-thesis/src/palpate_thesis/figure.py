@@ -17,8 +17,7 @@ class FigureModule(Protocol):
     """A module or object with one figure.
 
     ``NUMBER`` is the thesis' number of the figure ("6.11"), or our own name of an explanation
-    ("why-negative-mass"), by which claims.toml has its title and caption. It may have ``beside(data)``, a second
-    figure that the page folds away and whose docstring is its caption, and ``tables(data)``.
+    ("why-negative-mass"), by which claims.toml has its title and caption. It may have ``tables(data)``.
     """
 
     NUMBER: str

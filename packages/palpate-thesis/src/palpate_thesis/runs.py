@@ -109,21 +109,6 @@ RELAXING_FOAM = {
         "branch_time": 0.23,
     }
 }
-NEAREST_WALL = 0.457
-"""x of the nearest wall that the listed approach allows: it starts at 0.454 m and steps from 0.456 m outwards [m]."""
-
-
-def move_wall(experiment: Experiment, x: float) -> Mapping[str, Any]:
-    """Changes that bring start, approach and wall together to a wall at x [m]."""
-    offset = x - experiment.wall.x
-    start = experiment.robot.start
-    return {
-        "wall.x": x,
-        "robot.start": (start[0] + offset, *start[1:]),
-        "approach.first": experiment.approach.first + offset,
-    }
-
-
 LUGRE = ("coulomb", "static", "bristle_stiffness", "bristle_damping")
 
 
@@ -131,13 +116,3 @@ def rougher(experiment: Experiment, factor: float, *names: str) -> Mapping[str, 
     """Changes that multiply parameters of the joints' friction: those of these names, or all."""
     f = experiment.friction
     return {f"friction.{n}": tuple(factor * v for v in getattr(f, n)) for n in names or LUGRE}
-
-
-def friction_and_pose(experiment: Experiment) -> dict[str, Mapping[str, Any]]:
-    """Variations of every force-control figure: half and double friction, the wall nearer and farther."""
-    return {
-        "friction\nhalf": rougher(experiment, 0.5),
-        "friction\ndouble": rougher(experiment, 2.0),
-        "wall at\n0.457 m": move_wall(experiment, NEAREST_WALL),
-        "wall at\n0.49 m": move_wall(experiment, 0.49),
-    }

@@ -1,24 +1,17 @@
-"""Figure 4.3: the hybrid controller's block diagram, and the stiffest surface on which its force loop is stable."""
+"""The force loop of the thesis' controllers, linear: a tip on a surface, the sensor, its filters and the force law."""
 
-from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import load, with_values
-from palpate.controllers import hybrid
-from palpate.report import style
 from palpate.signals.filters import butterworth2
-from palpate_thesis.blocks import blocks_of
-from palpate_thesis.claims import ThesisClaim, claim
-from palpate_thesis.diagram import loop_diagram
-from palpate_thesis.drawing import LIMIT_LINE, Figure, panels
-from palpate_thesis.runs import SHORT, Runs
 
 TICK = 1e-3
 """[s]"""
+TIP = 8.2
+"""Effective mass of the arm along x at the wall, rotors included [kg]."""
 
 
 class LoopParameters(NamedTuple):
@@ -108,74 +101,3 @@ def _analog(cutoff: float) -> tuple[Array, Array, Array]:
     A, B, C, _ = tf2ss(*butter(3, 1.0, analog=True))
     w = 2.0 * np.pi * cutoff
     return w * A, w * B[:, 0], C[0]
-
-
-NUMBER = "4.3"
-PLACES = {
-    "u_x": (2.3, 3.6),
-    "error": (2.3, 2.2),
-    "integral": (4.6, 1.2),
-    "u_f": (6.6, 2.2),
-    "return": (8.6, 3.2),
-}
-"""Places of the steps of `Hybrid.step`."""
-PARAMETERS = with_values(load("foam-hybrid"), {**SHORT, "run.press": 3.0})
-TIP = 8.2
-"""Effective mass of the arm along x at the wall, rotors included [kg]."""
-GAINS = {"K_fp 1, K_fi 0.003 (foam)": (1.0, 0.003), "K_fp 0.25, K_fi 0.0015 (rubber)": (0.25, 0.0015)}
-CUTOFFS = np.geomspace(8.0, 300.0, 16)
-DAMPING = 200.0
-"""Of the surface [N s/m]."""
-Data = dict[str, Array]
-
-
-def run(_: Runs) -> Data:
-    """The linear loop over the cut-off of the force filter, by gains [N/m]."""
-    return {
-        name: np.array([loop(*gains, DAMPING, smoothing=c).limit() for c in CUTOFFS])
-        for name, gains in GAINS.items()
-    }
-
-
-def check(data: Data) -> Sequence[ThesisClaim]:
-    """A low cut-off against a high one."""
-    slow, fast = (_at(data, cutoff) for cutoff in (10.0, 120.0))
-    return [
-        claim(
-            "low-pass-destabilises",
-            all((s <= 0.5 * f for s, f in zip(slow, fast, strict=True))),
-            foam_slow=_text(slow[0]),
-            foam_fast=_text(fast[0]),
-            rubber_slow=_text(slow[1]),
-            rubber_fast=_text(fast[1]),
-        ),
-    ]
-
-
-def plot(_: Data) -> Figure:
-    """The steps of the hybrid controller around the arm on the surface."""
-    return loop_diagram(blocks_of(hybrid, "Hybrid.step"), PLACES, "foam-hybrid")
-
-
-def beside(data: Data) -> Figure:
-    """Stiffest surface on which the linear loop is stable, at a damping of 200 N s/m; dashed: the filter as used."""
-    drawing, ((axis,),) = panels([3.0])
-    for name, limits in data.items():
-        axis.loglog(CUTOFFS, limits / 1e3, label=name)
-    axis.axvline(PARAMETERS.filters.force, **LIMIT_LINE)
-    axis.set(xlabel="cut-off of the controller's force filter [Hz]", ylabel="stable up to [kN/m]")
-    style.legend(axis)
-    return drawing
-
-
-def loop(kf: float, ki: float, damping: float, smoothing: float = 120.0) -> LoopParameters:
-    """The linear loop of the bench's arm."""
-    return LoopParameters(kf, ki, damping, TIP, smoothing=smoothing)
-
-
-def _at(data: Data, cutoff: float) -> list[float]:
-    return [float(np.exp(np.interp(np.log(cutoff), np.log(CUTOFFS), np.log(v)))) for v in data.values()]
-
-
-def _text(limit: float) -> str:
-    return f"{limit / 1e3:.3g} kN/m" if np.isfinite(limit) else "none below 3 MN/m"
