@@ -15,7 +15,6 @@ import msgspec
 from palpate.errors import InputError
 from palpate.files import check_place, kept_folder, with_author, write_json, write_text
 from palpate.report import style
-from palpate.report.look.assets import text_of
 from palpate.report.page import data_address, render
 from palpate_thesis.claims import (
     VERDICTS,
@@ -222,7 +221,6 @@ def index_page(
         laboratory=state.written.laboratory,
         unknowns=_unknowns_table(state),
         seconds=sum(study.seconds for study in done),
-        scripts=(text_of("index.js", "palpate_thesis"),),
     )
 
 
