@@ -29,21 +29,13 @@ EQUATION = re.compile(r"#.*?(\(\d\.\d+\))")
 
 
 class Block(NamedTuple):
-    """One step of a law.
+    """One step of a law."""
 
-    Args:
-        name: of the value that the step computes; of the function, if it only changes a memory; or "return".
-        law: name of the function that computes the value; empty for a formula.
-        formula: right-hand side, in the letters of the thesis.
-        equation: number in the thesis, "(4.19)"; empty if the source names none.
-        inputs: names of other blocks, and of what the law is given ("sense.x").
-    """
-
-    name: str
-    law: str
-    formula: str
-    equation: str
-    inputs: frozenset[str]
+    name: str  # of the value that the step computes; of a function that only changes a memory; "return"
+    law: str  # name of the function that computes the value; empty for a formula
+    formula: str  # right-hand side, in the letters of the thesis
+    equation: str  # number in the thesis, "(4.19)"; empty if the source names none
+    inputs: frozenset[str]  # names of other blocks, and of what the law is given ("sense.x")
 
 
 class _Reader:

@@ -31,48 +31,29 @@ ENOUGH = 0.9
 
 @dataclass(frozen=True)
 class ThesisClaim:
-    """One row of claims.json.
+    """One row of claims.json."""
 
-    Args:
-        id: the claim, "least-squares-foam-level"; with a suffix, ".K", if one sentence makes several claims.
-        source: where the thesis says it.
-        claim: its statement, in our words.
-        thesis: its value, with unit; or "in words" where it gives none.
-        measured: ours, with spread over the seeds, unit and seeds: see `spread`.
-        tolerance: the threshold that decides, stated before looking: "within 10 % of the value at 4 s by 0.12 s".
-        verdict: one of `VERDICTS`.
-        note: one paragraph: the reason, the chosen values and their effect, the range of validity.
-        of: sentence of the thesis about its experiments; about its set-up or a cited scheme; or ours.
-    """
-
-    id: str
-    source: str
-    claim: str
-    thesis: str
-    measured: str
-    tolerance: str
-    verdict: Verdict
-    note: str
-    of: Of = "ours"
+    id: str  # the claim, "least-squares-foam-level"; with a suffix, ".K", if one sentence makes several claims
+    source: str  # where the thesis says it
+    claim: str  # its statement, in our words
+    thesis: str  # its value, with unit; or "in words" where it gives none
+    measured: str  # ours, with spread over the seeds, unit and seeds: see `spread`
+    tolerance: str  # the threshold that decides, stated before looking
+    verdict: Verdict  # one of `VERDICTS`
+    note: str  # one paragraph: the reason, the chosen values and their effect, the range of validity
+    of: Of = "ours"  # of the thesis about its experiments, or its set-up and cited schemes; or ours
 
 
 @dataclass
 class Done:
-    """Study that has been measured, with its claims.
+    """Study that has been measured, with its claims."""
 
-    Args:
-        number, title, caption: of its figure.
-        claims: decided by it.
-        seconds: that it took.
-        tables: shown under the figure.
-    """
-
-    number: str
+    number: str  # of its figure
     title: str
     caption: str
-    claims: list[ThesisClaim]
-    seconds: float
-    tables: list[Table] = field(default_factory=list)
+    claims: list[ThesisClaim]  # decided by it
+    seconds: float  # that it took
+    tables: list[Table] = field(default_factory=list)  # shown under the figure
 
 
 def verdict_of(id_: str, holds: bool) -> Verdict:
@@ -189,23 +170,14 @@ def claim(id_: str, holds: bool | Verdict, /, **numbers: Any) -> ThesisClaim:
 
 @dataclass(frozen=True, eq=False)
 class Sentence:
-    """A sentence of the thesis as a condition on one run.
+    """A sentence of the thesis as a condition on one run."""
 
-    Args:
-        id: of its claim.
-        holds: True if the sentence holds in one run, by the result of its figure's metric.
-        value: number of a run that its text prints.
-        unit: of that number.
-        fraction: least fraction of the runs in which the sentence has to hold; None for a majority.
-        numbers: further values of the placeholders in its texts.
-    """
-
-    id: str
-    holds: Callable[[Any], bool]
-    value: Callable[[Any], float] = lambda _: np.nan
-    unit: str = ""
-    fraction: float | None = ENOUGH
-    numbers: Mapping[str, Any] = field(default_factory=dict)
+    id: str  # of its claim
+    holds: Callable[[Any], bool]  # True if it holds in one run, by the result of the figure's metric
+    value: Callable[[Any], float] = lambda _: np.nan  # number of a run that its text prints
+    unit: str = ""  # of that number
+    fraction: float | None = ENOUGH  # of the runs in which it has to hold; None for a majority
+    numbers: Mapping[str, Any] = field(default_factory=dict)  # further values of placeholders
 
     def is_true(self, held: int, runs: int) -> bool:
         """True if the sentence holds in enough of the runs."""

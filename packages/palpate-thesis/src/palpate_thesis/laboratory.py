@@ -31,24 +31,15 @@ FOAM_LIMIT = 15000.0
 
 @dataclass(frozen=True)
 class Unknown:
-    """A parameter that the thesis does not state.
+    """A parameter that the thesis does not state."""
 
-    Args:
-        name: field of `Laboratory`.
-        unit: of its values; "" for a number without one.
-        prior: distribution of its values: even, even in the logarithm, one of a few with equal probability, or a seed.
-        low, high: range; of a choice, the first and the last value.
-        reason: of the range.
-        choices: possible values, if they are a few.
-    """
-
-    name: str
-    unit: str
-    prior: Literal["even", "log-even", "one of", "any seed"]
-    low: float
-    high: float
-    reason: str
-    choices: tuple[float, ...] = ()
+    name: str  # field of `Laboratory`
+    unit: str  # of its values; "" for a number without one
+    prior: Literal["even", "log-even", "one of", "any seed"]  # distribution of its values
+    low: float  # of its range; of a choice, the first value
+    high: float  # likewise; the last value
+    reason: str  # of the range
+    choices: tuple[float, ...] = ()  # possible values, if they are a few
 
     @property
     def values(self) -> tuple[float, ...]:

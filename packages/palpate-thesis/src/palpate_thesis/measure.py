@@ -35,21 +35,13 @@ STATE = "thesis.json"
 
 @dataclass(frozen=True)
 class MeasurementFormat:
-    """How a measurement is written.
+    """How a measurement is written."""
 
-    Args:
-        command: command line that makes it again, for its page.
-        laboratory: its name, for the page.
-        endings: of the figures' files, besides the PNG that the page shows.
-        dpi: of a PNG; the usual one if None.
-        about: the laboratory of the experiments, in words.
-    """
-
-    command: str
-    laboratory: str = "bench"
-    endings: tuple[str, ...] = (".png",)
-    dpi: int | None = None
-    about: str = ""
+    command: str  # command line that makes it again, for its page
+    laboratory: str = "bench"  # its name, for the page
+    endings: tuple[str, ...] = (".png",)  # of the figures' files, besides the PNG that the page shows
+    dpi: int | None = None  # of a PNG; the usual one if None
+    about: str = ""  # the laboratory of the experiments, in words
 
 
 @dataclass

@@ -31,19 +31,12 @@ EXPERIMENTS: Mapping[str, Experiment] = {
 
 
 class PrintedFact(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A printed number.
+    """A printed number."""
 
-    Args:
-        path: of the attribute that has the value, "robot.torque_limits".
-        printed: number, list of them, or word; "none" for the absence of a value.
-        where: place in the thesis, and what contradicts it there.
-        rule: relation of a laboratory's value to the printed one.
-    """
-
-    path: str
-    printed: Any
-    where: str
-    rule: Literal["equal", "at most", "above"] = "equal"
+    path: str  # of the attribute that has the value, "robot.torque_limits"
+    printed: Any  # number, list of them, or word; "none" for the absence of a value
+    where: str  # place in the thesis, and what contradicts it there
+    rule: Literal["equal", "at most", "above"] = "equal"  # of a laboratory's value to it
 
     def allows(self, value: Any) -> bool:
         """True if a value agrees with the printed one."""

@@ -33,17 +33,11 @@ def sources_digest() -> str:
 
 @dataclass(frozen=True)
 class Runs:
-    """Run experiments on the bench; compiled loops release the interpreter, so threads fill the cores.
+    """Run experiments on the bench; compiled loops release the interpreter, so threads fill the cores."""
 
-    Args:
-        seeds: of the noise; every claim is measured over all of them.
-        waiting: called when a loop has to be compiled first.
-        laboratory: in which every experiment is run.
-    """
-
-    seeds: Sequence[int] = tuple(range(10))
-    waiting: Callable[[], None] | None = None
-    laboratory: Laboratory = BENCH
+    seeds: Sequence[int] = tuple(range(10))  # of the noise; every claim is measured over all of them
+    waiting: Callable[[], None] | None = None  # called when a loop has to be compiled first
+    laboratory: Laboratory = BENCH  # in which every experiment is run
     _stopped: threading.Event = field(default_factory=threading.Event, compare=False, repr=False)
 
     def record(self, experiment: Experiment, seed: int | None = None) -> Record:

@@ -34,25 +34,15 @@ class Data(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LeastSquaresFigure:
-    """A figure of least squares on one surface.
+    """A figure of least squares on one surface."""
 
-    Args:
-        NUMBER: of the figure.
-        surface: "foam" or "rubber".
-        sentences: about its presses.
-        front: end of the columns of M, B and K that are drawn.
-        slot: that is drawn [s].
-        stated: time to settle in the thesis [s].
-        foams: on which `ALL_AT_ONCE` is tried.
-    """
-
-    NUMBER: str
-    surface: str
-    sentences: Sequence[Sentence]
-    front: str = "thesis"
-    slot: tuple[float, float] = (0.0, FIRST)
-    stated: float | None = None
-    foams: Mapping[str, Experiment] | None = None
+    NUMBER: str  # of the figure
+    surface: str  # "foam" or "rubber"
+    sentences: Sequence[Sentence]  # about its presses
+    front: str = "thesis"  # end of the columns of M, B and K that are drawn
+    slot: tuple[float, float] = (0.0, FIRST)  # that is drawn [s]
+    stated: float | None = None  # time to settle in the thesis [s]
+    foams: Mapping[str, Experiment] | None = None  # on which `ALL_AT_ONCE` is tried
 
     def run(self, runs: Runs) -> Data:
         """One press a seed on the surface; one on each of the other foams."""

@@ -33,27 +33,16 @@ class Tracked(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ForceFigure:
-    """A figure of the force: an experiment, a metric, sentences and a slot.
+    """A figure of the force: an experiment, a metric, sentences and a slot."""
 
-    Args:
-        NUMBER: of the figure.
-        sentences: about one run.
-        PARAMETERS: experiment, long enough for all windows.
-        measure: metric of a run.
-        words: values of the placeholders in the texts of the first sentence.
-        shown: from when to when after contact the force is drawn [s].
-        others: experiments that are measured as well.
-        seeds: number of their seeds; None for all.
-    """
-
-    NUMBER: str
-    sentences: Sequence[Sentence]
-    PARAMETERS: Experiment
-    measure: Callable[[Record], Any]
-    words: Callable[[Tracked], dict[str, Any]]
-    shown: tuple[float, float] = (9.5, 13.5)
-    others: Mapping[str, Experiment] = field(default_factory=dict)
-    seeds: int | None = None
+    NUMBER: str  # of the figure
+    sentences: Sequence[Sentence]  # about one run
+    PARAMETERS: Experiment  # experiment, long enough for all windows
+    measure: Callable[[Record], Any]  # metric of a run
+    words: Callable[[Tracked], dict[str, Any]]  # values of placeholders in the first sentence's texts
+    shown: tuple[float, float] = (9.5, 13.5)  # from when to when after contact the force is drawn [s]
+    others: Mapping[str, Experiment] = field(default_factory=dict)  # experiments that are measured as well
+    seeds: int | None = None  # number of their seeds; None for all
 
     def run(self, runs: Runs) -> Tracked:
         """All seeds."""

@@ -15,27 +15,16 @@ TIP = 8.2
 
 
 class LoopParameters(NamedTuple):
-    """Parameters that decide the stability, besides the surface's stiffness.
+    """Parameters that decide the stability, besides the surface's stiffness."""
 
-    Args:
-        kf: K_fp.
-        ki: K_fi [per sample].
-        damping: B_e of the surface [N s/m].
-        tip: mass along the force [kg].
-        mass: M_e of the surface [kg].
-        cutoff: of the sensor's analog low-pass, of third order [Hz].
-        late: how long the sensor computes and holds [s].
-        smoothing: cut-off of the controller's own filter [Hz].
-    """
-
-    kf: float
-    ki: float
-    damping: float
-    tip: float
-    mass: float = 0.05
-    cutoff: float = 120.0
-    late: float = 1.5 / 480.0
-    smoothing: float = 120.0
+    kf: float  # K_fp
+    ki: float  # K_fi [per sample]
+    damping: float  # B_e of the surface [N s/m]
+    tip: float  # mass along the force [kg]
+    mass: float = 0.05  # M_e of the surface [kg]
+    cutoff: float = 120.0  # of the sensor's analog low-pass, of third order [Hz]
+    late: float = 1.5 / 480.0  # how long the sensor computes and holds [s]
+    smoothing: float = 120.0  # cut-off of the controller's own filter [Hz]
 
     def radius(self, stiffness: Array) -> Array:
         """Spectral radius of one tick on surfaces of these stiffnesses [N/m], shape (n,); above 1 it is unstable."""

@@ -69,17 +69,11 @@ class TriedLaboratory(msgspec.Struct, frozen=True):
 
 
 class SearchState(msgspec.Struct):
-    """Content of the state file.
+    """Content of the state file."""
 
-    Args:
-        stamp: identity of the search.
-        tried: laboratories in the order of their numbers.
-        judged: number of `SEEDS` in which each sentence held, by the values of a laboratory.
-    """
-
-    stamp: str
-    tried: list[TriedLaboratory] = []
-    judged: dict[str, dict[str, int]] = {}
+    stamp: str  # identity of the search
+    tried: list[TriedLaboratory] = []  # laboratories in the order of their numbers
+    judged: dict[str, dict[str, int]] = {}  # `SEEDS` in which each sentence held, by laboratory
 
 
 @dataclass(frozen=True)
@@ -100,20 +94,13 @@ class JudgedLaboratory:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """The best laboratory of a search and the hand-chosen bench, both over all seeds.
+    """The best laboratory of a search and the hand-chosen bench, both over all seeds."""
 
-    Args:
-        tried: number of laboratories.
-        bench, inferred: the two.
-        plausible: further laboratories, each with sentences that do not hold in the inferred one and hold there.
-        sensitivity: by unknown, the sentences whose truth changes when it alone takes other values of its prior.
-    """
-
-    tried: int
+    tried: int  # number of laboratories
     bench: JudgedLaboratory
     inferred: JudgedLaboratory
-    plausible: tuple[tuple[Laboratory, tuple[str, ...]], ...]
-    sensitivity: Mapping[str, tuple[str, ...]]
+    plausible: tuple[tuple[Laboratory, tuple[str, ...]], ...]  # with the sentences that hold in each
+    sensitivity: Mapping[str, tuple[str, ...]]  # by unknown, the sentences that it decides alone
 
     @property
     def laboratories(self) -> dict[str, JudgedLaboratory]:
@@ -139,26 +126,15 @@ class SearchResult:
 
 @dataclass(frozen=True)
 class LaboratorySearch:
-    """Settings of a search.
+    """Settings of a search."""
 
-    Args:
-        folder: for the state and the inferred laboratory.
-        command: command line that is written into the laboratory.
-        tries: number of laboratories; rounded up to whole generations.
-        seed: of everything drawn.
-        half: True to search by the sentences of the calibration half alone.
-        start: name or file of the laboratory that is tried first; None to start from the prior alone.
-        threads: number of threads.
-        progress: called with the name of the work, the number done and the total.
-    """
-
-    folder: Path
-    command: str
-    tries: int
-    seed: int = 1
-    half: bool = False
-    start: str | None = None
-    threads: int = 1
+    folder: Path  # for the state and the inferred laboratory
+    command: str  # command line that is written into the laboratory
+    tries: int  # number of laboratories; rounded up to whole generations
+    seed: int = 1  # of everything drawn
+    half: bool = False  # True to search by the sentences of the calibration half alone
+    start: str | None = None  # laboratory that is tried first; None to start from the prior alone
+    threads: int = 1  # number of threads
     progress: Callable[[str, int, int], None] = lambda _name, _done, _total: None
 
     @property

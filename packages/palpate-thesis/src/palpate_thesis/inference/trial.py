@@ -36,19 +36,12 @@ class WatchedPress(NamedTuple):
 
 @dataclass(eq=False)
 class Trial:
-    """One laboratory and one seed of the noise; `trial[name]` is the result of an experiment of `MEASURES`.
+    """One laboratory and one seed of the noise; `trial[name]` is the result of an experiment of `MEASURES`."""
 
-    Args:
-        laboratory: in which the experiments run, each once and only when its result is asked for.
-        seed: of the noise.
-        steps: of the physics in a tick.
-        stopped: polled between pieces of a run; True ends it with KeyboardInterrupt.
-    """
-
-    laboratory: Laboratory
-    seed: int = 0
-    steps: int = STEPS
-    stopped: Callable[[], bool] = lambda: False
+    laboratory: Laboratory  # in which the experiments run, each once and only when its result is asked for
+    seed: int = 0  # of the noise
+    steps: int = STEPS  # of the physics in a tick
+    stopped: Callable[[], bool] = lambda: False  # polled in a run; True: KeyboardInterrupt
     _results: dict[str, Any] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Any:

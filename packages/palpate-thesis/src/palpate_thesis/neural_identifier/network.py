@@ -41,25 +41,15 @@ although the network's is the smaller one on rubber."""
 
 
 class NetworkPress(NamedTuple):
-    """One contact, as the thesis' identifiers are given it, and what is known of it.
+    """One contact, as the thesis' identifiers are given it, and what is known of it."""
 
-    Args:
-        surface: whose scales and probe the thesis gives: "foam" or "rubber".
-        inputs: displacement [m], velocity [m/s], acceleration [m/s^2], shape (n, 3), one a millisecond.
-        force: filtered [N], shape (n,).
-        ratio: f/x at the end [N/m].
-        squares: K, B, M of recursive least squares, shape (n, 3).
-        matched: K, B, M of least squares on channels that share one lag, shape (n, 3).
-        truth: K, B, M of the surface, shape (3,).
-    """
-
-    surface: str
-    inputs: Array
-    force: Array
-    ratio: float
-    squares: Array
-    matched: Array
-    truth: Array
+    surface: str  # whose scales and probe the thesis gives: "foam" or "rubber"
+    inputs: Array  # displacement [m], velocity [m/s], acceleration [m/s^2], shape (n, 3), one a millisecond
+    force: Array  # filtered [N], shape (n,)
+    ratio: float  # f/x at the end [N/m]
+    squares: Array  # K, B, M of recursive least squares, shape (n, 3)
+    matched: Array  # K, B, M of least squares on channels that share one lag, shape (n, 3)
+    truth: Array  # K, B, M of the surface, shape (3,)
 
     @property
     def rest(self) -> float:
