@@ -62,12 +62,8 @@ def test_gains_are_tuned_by_the_least_error_of_a_run_that_kept_contact():
     def run(rms, lost=0):
         return Tracking(rms, rms, 0.0, 0.0, lost)
 
-    errors = {
-        ("h", "foam", "low"): run(2.0),
-        ("h", "foam", "high"): run(0.1, 1),
-        ("h", "foam", "mid"): run(1.0),
-    }
-    assert gain_sets.best_gains(errors)[2] == "mid"
+    errors = {"low": run(2.0), "high": run(0.1, 1), "mid": run(1.0)}
+    assert gain_sets.best_gains(errors) == "mid"
     assert gain_sets.TUNING_SEED not in Runs(range(1000)).seeds
 
 
@@ -77,7 +73,7 @@ def test_a_plausible_laboratory_shows_why_hybrid_gains_have_to_be_changed():
     laboratory = load_laboratory(plausible_laboratories()["conclusion-gains.hybrid"])
     experiments = {
         (name, surface): with_values(e, changes)
-        for name, (changes, _) in gain_sets.ONE_SET.items()
+        for name, (changes,) in ((n, grid.values()) for n, grid in gain_sets.ONE_SET.items())
         for surface, e in gain_sets.SURFACES.items()
     }
     results = Runs(range(2), laboratory=laboratory).by_name(experiments, tracking(*gain_sets.JUDGED))

@@ -201,7 +201,7 @@ def test_the_search_improves_on_the_prior(tmp_path, rule):
     assert result.tried == len(counts) == 256
     assert max(counts[64:]) > max(counts[:64])
     assert result.inferred.count_true(sentences()) == len(sentences())
-    assert 0 < result.bench.count_true(sentences()) < len(sentences())
+    assert 0 < result.laboratories["hand-chosen bench"].count_true(sentences()) < len(sentences())
 
 
 def test_an_interrupted_search_ends_as_one_that_was_not(tmp_path, rule):

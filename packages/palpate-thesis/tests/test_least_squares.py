@@ -44,8 +44,6 @@ def as_window(s: dict[str, np.ndarray], **changes) -> bias.RegressionWindow:
         "x0": 0.0,
         "wall": 0.0,
         "first": 5,
-        "sensor": (120.0, 480.0),
-        "cutoffs": (120.0, 35.0),
         "matched": np.zeros(3),
     }
     return bias.RegressionWindow(**{**values, **changes})

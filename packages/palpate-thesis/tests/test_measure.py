@@ -317,7 +317,7 @@ def test_ctrl_c_stops_the_runs_of_all_threads():
     timer.start()
     before, begun = threading.active_count(), time.monotonic()
     with pytest.raises(KeyboardInterrupt):
-        runs.over([(experiment, seed) for seed in range(4)], len)
+        runs.map(lambda seed: runs.record(experiment, seed), range(4))
     timer.join()
     assert time.monotonic() - begun < 20.0
     assert threading.active_count() <= before

@@ -110,12 +110,7 @@ def _is_given(node: ast.expr) -> bool:
 
 
 def read_blocks(source: str, function: str) -> dict[str, Block]:
-    """Blocks of a function by name, in the order of its steps.
-
-    Args:
-        source: text of its module.
-        function: its name, after that of its class: "Neural.step".
-    """
+    """Blocks of a function, "Neural.step" in the source of its module, by name in the order of its steps."""
     body: list[ast.stmt] = ast.parse(source).body
     for name in function.split("."):
         body = next(n for n in body if isinstance(n, ast.ClassDef | ast.FunctionDef) and n.name == name).body

@@ -36,7 +36,7 @@ class ThesisClaim:
     id: str  # the claim, "least-squares-foam-level"; with a suffix, ".K", if one sentence makes several claims
     source: str  # where the thesis says it
     claim: str  # its statement, in our words
-    thesis: str  # its value, with unit; or "in words" where it gives none
+    thesis: str  # its value, with unit; the claim itself where it gives none
     measured: str  # ours, with spread over the seeds, unit and seeds: see `spread`
     tolerance: str  # the threshold that decides, stated before looking
     verdict: Verdict  # one of `VERDICTS`
@@ -160,7 +160,7 @@ def claim(id_: str, holds: bool | Verdict, /, **numbers: Any) -> ThesisClaim:
         holds: True if the claim is reproduced; or its verdict.
         numbers: values of the placeholders in its texts; a list with one value a seed is written as its spread.
     """
-    row = {"thesis": "in words", "measured": "{values}", **rows()[id_]}
+    row = {"thesis": rows()[id_]["claim"], "measured": "{values}", **rows()[id_]}
     values = {k: _Spread(v) if isinstance(v, list | np.ndarray) else v for k, v in numbers.items()}
     filled = {name: row[name].format(**values) for name in TEXTS}
     of: Of = "experiment" if "half" in row or id_.startswith(CONCLUSION) else row.get("of", "ours")

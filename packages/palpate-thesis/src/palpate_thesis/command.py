@@ -19,13 +19,8 @@ if TYPE_CHECKING:
     from palpate_thesis.measure import MeasurementFormat
     from palpate_thesis.runs import Runs
 
-COLORS = {
-    "reproduced": "green",
-    "reproduced in a plausible laboratory": "cyan",
-    "contradicted": "yellow",
-    "not checkable": "bright_black",
-}
-
+COLORS = ("green", "cyan", "yellow", "bright_black")
+"""Of the verdicts, in their order."""
 _MEASURED = Group("Measurement", sort_key=1)
 
 
@@ -101,7 +96,7 @@ def _measure(
 ) -> None:
     """Measure with a progress bar, and print the claims."""
     from palpate.report.page import Table
-    from palpate_thesis.claims import count_in_words, texts
+    from palpate_thesis.claims import VERDICTS, count_in_words, texts
     from palpate_thesis.measure import measure
 
     screen, total = console(), len(chosen)
@@ -122,7 +117,7 @@ def _measure(
     screen.print(written.about)
     if rows:
         table = Table("", ("claim", "thesis", "measured", "verdict"), rows)
-        show_table(screen, table, [COLORS[claim.verdict] for claim in claims])
+        show_table(screen, table, [COLORS[VERDICTS.index(claim.verdict)] for claim in claims])
     for study in done if len(done) == 1 else ():
         for beside in study.tables:
             show_table(screen, beside)

@@ -27,10 +27,8 @@ LOOK: dict[str, Any] = {
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",
     "axes.labelcolor": style.QUIET,
-    "xtick.labelsize": 8.0,
-    "ytick.labelsize": 8.0,
-    "xtick.labelcolor": style.QUIET,
-    "ytick.labelcolor": style.QUIET,
+    **{f"{axis}tick.labelsize": 8.0 for axis in "xy"},
+    **{f"{axis}tick.labelcolor": style.QUIET for axis in "xy"},
     "legend.fontsize": 8.0,
     "legend.title_fontsize": 8.0,
     "legend.frameon": False,
@@ -78,8 +76,3 @@ def limits(axis: Axes, shown: Record) -> None:
         look: dict[str, Any] = {"color": style.FAIL, "linewidth": 0, "label": "a motor at its limit"}
         transform = axis.get_xaxis_transform()
         axis.fill_between(shown["t"], 0.0, 0.035, where=limited, transform=transform, **look)
-
-
-def legend_inside(axis: Axes, **options: object) -> None:
-    """The legend in a corner of the panel, where panels stand side by side."""
-    axis.legend(frameon=True, framealpha=0.85, edgecolor="none", **options)

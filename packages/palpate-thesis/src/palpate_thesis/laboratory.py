@@ -282,10 +282,7 @@ def laboratory_from(values: Mapping[str, Any], where: str, base: Laboratory) -> 
 def laboratory_text(laboratory: Laboratory, start: Laboratory, **head: str | Sequence[str]) -> str:
     """A laboratory as a TOML file that `load_laboratory` reads, with the values that are not those of its base.
 
-    Args:
-        laboratory: values.
-        start: the laboratory that the file names as `base`; the bench if it names none.
-        head: texts of the other keys.
+    The base is `start`, which `head` names in `base`, or the bench; `head` has the texts of all other keys.
     """
     values, others = laboratory.numbers(), start.numbers()
     changed = [f"{name} = {value!r}" for name, value in values.items() if value != others.get(name)]

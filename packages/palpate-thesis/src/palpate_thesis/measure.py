@@ -185,14 +185,7 @@ CHAPTERS = {
 def index_page(
     done: Sequence[Done], pictures: Mapping[str, str], missing: Sequence[str], state: FolderState
 ) -> str:
-    """The page as HTML, figures included; it opens without a network.
-
-    Args:
-        done: measured studies.
-        pictures: source of each image, by the number of its study.
-        missing: numbers of the studies still to come.
-        state: of the folder.
-    """
+    """The page as HTML, with the measured studies and their pictures by number; it opens without a network."""
     claims = [claim for study in done for claim in study.claims]
     verdicts = Counter(claim.verdict for claim in claims)
     titles = dict.fromkeys(chapter_of(study.number) for study in done)

@@ -2,7 +2,7 @@
 
 import hashlib
 import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +17,6 @@ from palpate_thesis.laboratory import BENCH, Laboratory
 
 K = TypeVar("K")
 T = TypeVar("T")
-W = TypeVar("W")
 
 VARIED_SEEDS = 3
 """Runs of each variation; the nominal case is run with all seeds."""
@@ -53,15 +52,7 @@ class Runs:
 
     def over_seeds(self, experiment: Experiment, measure: Callable[[Record], T]) -> list[T]:
         """`measure` of each seed's record; the records (some 12 MB each) are not stored."""
-        return self.over([(experiment, seed) for seed in self.seeds], measure)
-
-    def over(self, cases: Iterable[tuple[Experiment, int]], measure: Callable[[Record], T]) -> list[T]:
-        """`measure` of the record of each case, an experiment and a seed, in their order."""
-
-        def work(case: tuple[Experiment, int]) -> T:
-            return measure(self.record(*case))
-
-        return self.map(work, list(cases))
+        return self.by_name({"": experiment}, measure)[""]
 
     def by_name(
         self, experiments: Mapping[K, Experiment], measure: Callable[[Record], T], seeds: int | None = None

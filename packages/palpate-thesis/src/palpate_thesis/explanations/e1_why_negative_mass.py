@@ -28,6 +28,8 @@ CAUSES = {
 """Signal faults between the surface and the thesis' estimator, in the order of the waterfall."""
 BEFORE, PRESS = 1.5, 4.0
 TICK = 1e-3
+FORCE_CUTOFF, MOTION_CUTOFF, SAMPLING = 120.0, 35.0, 480.0
+"""Of the force sensor and the force's filter, of the acceleration's, and of the sensor [Hz]."""
 START, COVARIANCE = (0.0, 0.0, 2e5), 1e10
 
 
@@ -41,8 +43,6 @@ class RegressionWindow(NamedTuple):
     x0: float  # measured x at the change-over [m]
     wall: float  # [m]
     first: int  # sample of the change-over
-    sensor: tuple[float, float]  # cut-off and sampling of the force sensor [Hz]
-    cutoffs: tuple[float, float]  # of force and acceleration [Hz]
     matched: Array  # M, B, K of the matched front-end at the end of the window
 
 
@@ -62,8 +62,6 @@ def window(record: Record) -> RegressionWindow:
         x0=float(record["x_measured"][at]),
         wall=float(e["wall"]["x"]),
         first=first,
-        sensor=(float(e["force_sensor"]["cutoff"]), float(e["force_sensor"]["sampling"])),
-        cutoffs=(float(e["filters"]["force"]), float(e["filters"]["motion"])),
         matched=np.array([record[f"{key}_matched"][rows][-1] for key in "MBK"]),
     )
 
@@ -89,22 +87,22 @@ def _motion(press: RegressionWindow, causes: Collection[str]) -> tuple[Array, Ar
         v = np.gradient(position, TICK)
         a = np.gradient(v, TICK)
     if "acceleration" in causes:
-        a = filter_signal(butterworth2(press.cutoffs[1], 1.0 / TICK), a)
+        a = filter_signal(butterworth2(MOTION_CUTOFF, 1.0 / TICK), a)
     return position - (press.x0 if "offset" in causes else press.wall), v, a
 
 
 def _force(press: RegressionWindow, causes: Collection[str]) -> Array:
-    sensed = through_sensor(press.force, *press.sensor)
+    sensed = through_sensor(press.force)
     force = sensed if "lag" in causes else press.force
     if "noise" in causes:
         force = force + (press.sampled - sensed)
-    return filter_signal(butterworth2(press.cutoffs[0], 1.0 / TICK), force) if "filter" in causes else force
+    return filter_signal(butterworth2(FORCE_CUTOFF, 1.0 / TICK), force) if "filter" in causes else force
 
 
-def through_sensor(force: Array, cutoff: float = 120.0, sampling: float = 480.0) -> Array:
+def through_sensor(force: Array) -> Array:
     """The force as the sensor gives it without noise: its filter, one cycle of computing, half a cycle of holding."""
-    analog = butterworth3(cutoff, 1.0 / TICK)
-    return late(filter_signal(analog.second, filter_signal(analog.first, force)), 1.5 / sampling)
+    analog = butterworth3(FORCE_CUTOFF, 1.0 / TICK)
+    return late(filter_signal(analog.second, filter_signal(analog.first, force)), 1.5 / SAMPLING)
 
 
 def filter_signal(section: Biquad, signal: Array) -> Array:

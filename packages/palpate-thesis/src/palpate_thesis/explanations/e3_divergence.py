@@ -11,7 +11,7 @@ from palpate.controllers.neural import NeuralState
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim
-from palpate_thesis.drawing import LIMIT_LINE, Axes, Figure, legend_inside, panels
+from palpate_thesis.drawing import LIMIT_LINE, Axes, Figure, panels
 from palpate_thesis.explanations.e2_integrator import PI
 from palpate_thesis.force_control.interventions import HOLD_INTERVAL, layers, watch, without_torques
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, slot
@@ -111,13 +111,11 @@ def plot(data: Data) -> Figure:
     for sizes, part in zip(course.sizes.T, PARTS, strict=True):
         weights.plot(course.t, sizes, linewidth=1.2, label=part)
     weights.set(xlabel="time since contact [s]", ylabel="size of the weights", ylim=(0.0, None))
-    weights.set_title("weights on the foam that relaxes, eta 5e-5")
     for (name, by_rate), color in zip(data.courses.items(), style.SERIES, strict=False):
         course = by_rate[5e-5][0]
         gains.plot(course.t, course.gain, color=color, linewidth=1.2, label=name)
         _times(times, name, by_rate, color)
     gains.set(xlabel="time since contact [s]", ylabel="gain [N per N m]", ylim=(0.0, None))
-    gains.set_title("from the torques to the network's force, eta 5e-5")
     if data.loss is not None:
         signals = {"network's force": data.loss["memory_fx"], "contact force": data.loss["force"]}
         signals["velocity along x [5 mm/s]"] = 200.0 * data.loss["vx_measured"]
@@ -127,7 +125,7 @@ def plot(data: Data) -> Figure:
     times.set(xscale="log", xlabel="learning rate eta", ylabel="contact lost after [s]")
     times.axhline(DURATION, **LIMIT_LINE, label=f"kept for {DURATION:g} s, as with PI")
     for axis in (weights, gains, last, times):
-        legend_inside(axis)
+        style.legend(axis, ncols=2)
     return drawing
 
 

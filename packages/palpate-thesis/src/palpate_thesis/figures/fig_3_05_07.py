@@ -19,10 +19,8 @@ from palpate_thesis.runs import Runs
 PARAMETERS = {"R1": 100.0, "R2": 1.5, "C1": 470e-6, "C2": 10e-6}
 """As printed, in ohm and farad; read as kilo-ohm and nanofarad they give the same gain."""
 PRINTED = np.array(list(PARAMETERS.values()))
-COMPONENTS = 0.05
-"""Tolerance of a component."""
-NEAR = 0.05
-"""Maximum relative difference of a frequency from the printed one."""
+COMPONENTS = NEAR = 0.05
+"""Tolerance of a component, and of a frequency from the printed one."""
 FREQUENCY = np.geomspace(10.0, 2000.0, 400)
 STEADY = 12.0
 """Seconds at the end of the press that are looked at [s]."""

@@ -170,14 +170,7 @@ def _route(start: Place, end: Place) -> list[Place]:
 def _loop(
     blocks: Mapping[str, Block], places: Mapping[str, Place], experiment: str, sizes: str = ""
 ) -> Figure:
-    """Steps of a controller around the arm on the surface of an experiment.
-
-    Args:
-        blocks: steps.
-        places: of the steps; the arm stands to the right of "return".
-        experiment: name of the shipped experiment that has the surface.
-        sizes: neurons of the layers of its network, if it has one.
-    """
+    """Steps of a controller around the arm, to the right of "return", on the surface of a shipped experiment."""
     drawing, axis = _canvas(12.0, 4.5, 5.0)
     _draw_steps(axis, blocks, places, sizes)
     plant, low = (places["return"][0] + 2.1, places["return"][1]), -0.15

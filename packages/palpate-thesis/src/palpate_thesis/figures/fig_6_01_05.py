@@ -94,13 +94,7 @@ def _settles(surface: str, limit: float) -> list[Sentence]:
 
 
 def round_to(stiffness: float, ratio: float, digit: float) -> tuple[float, float]:
-    """Limits of K_e over f/x, less one, between which both can round to the printed values.
-
-    Args:
-        stiffness: printed K_e.
-        ratio: printed f/x.
-        digit: half a unit of their last digit.
-    """
+    """Limits of K_e over f/x, less one, if both round to these; `digit` is half a unit of their last digit."""
     return (stiffness - digit) / (ratio + digit) - 1.0, (stiffness + digit) / (ratio - digit) - 1.0
 
 

@@ -45,7 +45,7 @@ class Data(NamedTuple):
 def learn_at(runs: Runs, experiment: Experiment, surface: str, rates: Sequence[float]) -> Data:
     """One press a noise seed, all starts on each, at every rate."""
     presses, start = network.presses(runs, experiment, surface), network.starts(runs)[0]
-    choices = {rate: network.chosen_network(runs)._replace(rate=rate) for rate in rates}
+    choices = {rate: network.identifier_network(runs.laboratory, rate) for rate in rates}
     curves = {rate: network.learn(presses[0], choice, start)[1] for rate, choice in choices.items()}
     answers = {rate: network.answers(runs, presses, choice) for rate, choice in choices.items()}
     return Data(presses[0], curves, answers)
@@ -136,26 +136,15 @@ class LearningRate:
 
     def check(self, data: Data) -> Sequence[ThesisClaim]:
         """Smaller takes longer; too large never converges."""
-        times = [
-            f"{rate:g}: {spread([a.error_gone for a in data.answers[rate]], 's', 2)}" for rate in SMALLER
-        ]
-        first, largest = stuck_from(data.answers), data.answers[RATES[-1]]
-        found = bool(np.isfinite(first))
+        gone = {rate: [a.error_gone for a in data.answers[rate]] for rate in SMALLER}
+        times = "; ".join(f"{rate:g}: {spread(values, 's', 2)}" for rate, values in gone.items())
+        slower, first = often(slower_throughout(data.answers)), stuck_from(data.answers)
+        words = f"from rate {first:g}" if first <= RATES[-1] else "at none that was tried"
+        largest = [stuck(answer) for answer in data.answers[RATES[-1]]]
+        numbers = {"stuck": words, "largest": RATES[-1], "runs": sum(largest), "of": len(largest)}
         return [
-            claim(
-                "network-learning-rate.slower",
-                often(slower_throughout(data.answers)),
-                times="; ".join(times),
-                gone=GONE,
-            ),
-            claim(
-                "network-learning-rate.too-large",
-                found,
-                stuck=f"from rate {first:g}" if found else "at none that was tried",
-                largest=RATES[-1],
-                runs=sum(map(stuck, largest)),
-                of=len(largest),
-            ),
+            claim("network-learning-rate.slower", slower, times=times, gone=GONE),
+            claim("network-learning-rate.too-large", first <= RATES[-1], **numbers),
         ]
 
     def plot(self, data: Data) -> Figure:

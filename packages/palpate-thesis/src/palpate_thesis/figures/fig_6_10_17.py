@@ -15,7 +15,7 @@ from palpate.studies.metrics.window import SETTLE, rms
 from palpate_thesis.claims import Sentence, ThesisClaim, claim, spread
 from palpate_thesis.drawing import Figure, force_figure, panels
 from palpate_thesis.force_control import tracking
-from palpate_thesis.force_control.tracking import FOLLOWS, HYBRID, Tracking, describe, since_contact, slot
+from palpate_thesis.force_control.tracking import FOLLOWS, Tracking, describe, hybrid, since_contact, slot
 from palpate_thesis.runs import VARIED_SEEDS, Runs, rougher
 
 SLOW_RATE = {"controller.learning_rate": 1e-5}
@@ -245,11 +245,11 @@ PLAIN = {"controller": {"kind": "proportional-integral", "kf": 0.25, "ki": 1.0}}
 HYBRID_ALONE = ForceFigure(
     "6.10",
     [Sentence("hybrid-alone-falls-short", misses)],
-    _pressing(tracking.FOAM, 15.0, HYBRID),
+    _pressing(tracking.FOAM, 15.0, hybrid(0.25, 0.0)),
     interval_ends,
     lambda data: {"foam": data.nominal, "rubber": data.others["rubber"], "share": SHARE},
     (5.0, 15.0),
-    {"rubber": _pressing(tracking.RUBBER, 15.0, HYBRID)},
+    {"rubber": _pressing(tracking.RUBBER, 15.0, hybrid(0.25, 0.0))},
 )
 FOAM = ForceFigure("6.11", [_follows("neural-foam-steps")], ON_FOAM, LATE, _following)
 SINE = ForceFigure("6.12", [_follows("neural-foam-sine")], ON_FOAM_SINE, LATE, _following, (9.75, 15.0))

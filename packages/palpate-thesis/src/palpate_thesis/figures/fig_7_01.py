@@ -40,8 +40,6 @@ COLUMNS: Mapping[str, Callable[[Identified], float]] = {
     "ripple of K [%]": lambda a: 100.0 * a.ripple,
 }
 """Columns of the first table."""
-FORCE_COLUMNS = ("RMS error outside the steps [N]", "with steps [N]", "interval ends off by [%]", "follow")
-"""Columns of the second table, besides the controller and its gains."""
 Value = tuple[str, str, str]
 """Method, attribute of `Identified`, and unit of a placeholder."""
 
@@ -176,10 +174,14 @@ def tables(data: Data) -> list[Table]:
         errors = zip(*((run.settled, run.rms, 100.0 * run.off) for run in runs), strict=True)
         follow = fraction([run.follows for run in runs])
         force.append([f"{surface}: {name}", data.force.gains[name, surface], *map(spread, errors), follow])
-    head = ("controller", "gains", *FORCE_COLUMNS)
+    columns = "RMS error outside the steps [N]", "with steps [N]", "interval ends off by [%]"
     return [
         Table("Identification: the same presses by each method", ("method", *COLUMNS), rows),
-        Table("Force control: the same steps by each controller", head, force),
+        Table(
+            "Force control: the same steps by each controller",
+            ("controller", "gains", *columns, "follow"),
+            force,
+        ),
     ]
 
 

@@ -1,7 +1,7 @@
 """Experiments of force control, and the criterion of following."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,8 +25,11 @@ SINE = {"force.amplitude": 4.0, "force.frequency": 0.5, "force.restart": 5.0}
 """4 sin(pi t), its clock started anew every 5 s as the listing does; that turns the sine's sign each time."""
 FOAM = with_values(load("foam-neural"), SHORT)
 RUBBER = with_values(load("rubber-neural"), SHORT)
-HYBRID = {"controller": {"kind": "hybrid", "kp": 400.0, "kv": 80.0, "kf": 0.25, "ki": 0.0}}
-"""The hybrid controller without integral in place of the neural one."""
+
+
+def hybrid(kf: float, ki: float) -> dict[str, Any]:
+    """Changes that put the hybrid controller with these force gains in place of the neural one."""
+    return {"controller": {"kind": "hybrid", "kp": 400.0, "kv": 80.0, "kf": kf, "ki": ki}}
 
 
 class Tracking(NamedTuple):

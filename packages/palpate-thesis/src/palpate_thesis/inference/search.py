@@ -97,15 +97,14 @@ class SearchResult:
     """The best laboratory of a search and the hand-chosen bench, both over all seeds."""
 
     tried: int  # number of laboratories
-    bench: JudgedLaboratory
-    inferred: JudgedLaboratory
+    laboratories: Mapping[str, JudgedLaboratory]  # both by name
     plausible: tuple[tuple[Laboratory, tuple[str, ...]], ...]  # with the sentences that hold in each
     sensitivity: Mapping[str, tuple[str, ...]]  # by unknown, the sentences that it decides alone
 
     @property
-    def laboratories(self) -> dict[str, JudgedLaboratory]:
-        """Both laboratories by name."""
-        return {"hand-chosen bench": self.bench, "inferred": self.inferred}
+    def inferred(self) -> JudgedLaboratory:
+        """The best laboratory."""
+        return self.laboratories["inferred"]
 
     def as_json(self) -> dict[str, Any]:
         """Results as the numbers of --json."""
@@ -162,7 +161,8 @@ class LaboratorySearch:
             inferred = max(judged, key=lambda lab: (lab.count_true(wanted), lab.count_runs(wanted)))
             plausible = self._find_plausible(state, inferred)
             sensitivity = self._find_sensitivity(inferred.laboratory)
-            result = SearchResult(len(state.tried), bench, inferred, plausible, sensitivity)
+            both = {"hand-chosen bench": bench, "inferred": inferred}
+            result = SearchResult(len(state.tried), both, plausible, sensitivity)
             self._write(result)
             return result
 
@@ -230,9 +230,9 @@ class LaboratorySearch:
             if any(name in ids for ids in plausible.values()):
                 continue
             for tried in [one for one in ranked if name in one.true][:ATTEMPTS]:
-                found = {id_ for ids in plausible.values() for id_ in ids}
+                elsewhere = {id_ for ids in plausible.values() for id_ in ids}
                 laboratory = laboratory_at(tried.fractions)
-                among = [s for s in missing.values() if s.id in tried.true and s.id not in found]
+                among = [s for s in missing.values() if s.id in tried.true and s.id not in elsewhere]
                 counts = self._count_seeds(state, laboratory, among)
                 true = tuple(s.id for s in among if s.is_true(counts[s.id], len(SEEDS)))
                 if name in true:

@@ -97,11 +97,6 @@ class NetworkChoice(NamedTuple):
         return kind(setting, self.amplitude, self.rate, seed=start, weights=weights, thresholds=thresholds)
 
 
-def chosen_network(runs: Runs) -> NetworkChoice:
-    """The network of the runs' laboratory."""
-    return identifier_network(runs.laboratory)
-
-
 def identifier_network(laboratory: Laboratory, rate: float = 1e-4) -> NetworkChoice:
     """The network of a laboratory."""
     lab = laboratory

@@ -47,7 +47,7 @@ class MethodComparison(NamedTuple):
 
 def compare(runs: Runs, experiment: Experiment, surface: str) -> MethodComparison:
     """Run all methods on one press a noise seed, the network from every start."""
-    presses, choice = network.presses(runs, experiment, surface), network.chosen_network(runs)
+    presses, choice = network.presses(runs, experiment, surface), network.identifier_network(runs.laboratory)
     cases = [(press, start) for press in presses for start in network.starts(runs)]
     (other,) = SETTINGS.keys() - {surface}
     choices = {
