@@ -126,8 +126,7 @@ def note_for(claim: ThesisClaim, laboratory: Laboratory) -> ThesisClaim:
 def sensitivity() -> Mapping[str, Sequence[str]]:
     """By unknown, the sentences whose truth it changes in the inferred laboratory: see `palpate laboratory`."""
     text = (resources.files("palpate_thesis") / "inference" / "sensitivity.toml").read_text("utf-8")
-    table: Mapping[str, Sequence[str]] = tomllib.loads(text)
-    return table
+    return tomllib.loads(text)
 
 
 def _load_state(

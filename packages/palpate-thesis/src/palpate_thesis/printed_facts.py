@@ -31,7 +31,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
 
 
 class PrintedFact(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A printed number."""
+    """A number that the thesis prints."""
 
     path: str  # of the attribute that has the value, "robot.torque_limits"
     printed: Any  # number, list of them, or word; "none" for the absence of a value

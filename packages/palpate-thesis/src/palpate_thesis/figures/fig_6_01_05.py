@@ -137,7 +137,7 @@ SHOWS: Mapping[str, Callable[[PressEstimates], bool]] = {
     "M < 0": lambda f: f.M < 0.0,
     **dict(zip(("raw: M < 0", "raw: B < 0", "raw: K = f/x"), (s.holds for s in RAW), strict=True)),
 }
-"""What figures 6.1 to 6.3 show of a foam."""
+"""Properties of a foam that figures 6.1 to 6.3 show."""
 ALL_AT_ONCE = Sentence(
     "least-squares-one-foam", lambda p: all(shows(p) for shows in SHOWS.values()), fraction=None
 )

@@ -45,7 +45,7 @@ class ForceFigure:
     seeds: int | None = None  # number of their seeds; None for all
 
     def run(self, runs: Runs) -> Tracked:
-        """All seeds."""
+        """All seeds, and the other experiments."""
         shown = slot(runs.record(self.PARAMETERS), *self.shown)
         others = runs.by_name(self.others, self.measure, self.seeds)
         return Tracked(shown, runs.over_seeds(self.PARAMETERS, self.measure), others)
@@ -104,20 +104,20 @@ def adapting(record: Record) -> Adapting:
     return Adapting(tracking.tracking(*FIRST)(record), adapted)
 
 
-class Course(NamedTuple):
+class MinutesRun(NamedTuple):
     """Tracking after minutes, and the error of each cycle on the way there."""
 
     tracking: Tracking
     errors: Array  # RMS outside the steps in each whole cycle of 5 s [N], shape (cycles,)
 
 
-def course(record: Record) -> Course:
+def course(record: Record) -> MinutesRun:
     """Tracking from 180 to 190 s, and the error of each cycle."""
     t, error = since_contact(record), record["force"] - record["force_desired"]
     settled = np.mod(t + 5e-7, 2.5) >= SETTLE
     starts = 5.0 * np.arange(int((float(t[-1]) + 1e-3) // 5.0))
     errors = [rms(error[settled & (t >= start) & (t < start + 5.0)]) for start in starts]
-    return Course(tracking.tracking(180.0, 190.0)(record), np.array(errors))
+    return MinutesRun(tracking.tracking(180.0, 190.0)(record), np.array(errors))
 
 
 class Errors(NamedTuple):

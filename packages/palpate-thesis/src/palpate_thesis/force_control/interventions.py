@@ -11,8 +11,6 @@ from palpate.bench.summary import LOST
 from palpate.controllers import alone
 from palpate.controllers.neural import NeuralState
 
-LOOK = 1000
-"""Ticks between two looks at the weights, unless others are given."""
 PHASE = list(COLUMNS).index("phase")
 FROM_TORQUES = slice(7, 10)
 """Columns of the hidden weights of the 9-12-3 network from the torques among its inputs."""
@@ -28,7 +26,7 @@ def watch(
     duration: float,
     look: Look,
     waiting: Callable[[], None] | None = None,
-    every: int = LOOK,
+    every: int = 1000,
 ) -> float | None:
     """Run like `Bench.run`, from the same random numbers, without a record, until contact is lost.
 

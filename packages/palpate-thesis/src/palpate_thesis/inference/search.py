@@ -50,9 +50,7 @@ CANDIDATES = 8
 """Best laboratories of the search that are judged over all seeds."""
 PLAUSIBLE = 0.5
 """Least fraction of the sentences that hold in a plausible laboratory: less shows one sentence against all others."""
-PLAUSIBLE_ABOUT = (
-    "Chosen for sentences that do not hold in the inferred one, and within the printed values too."
-)
+PLAUSIBLE_ABOUT = "For sentences that do not hold in the inferred one; within the printed values too."
 ATTEMPTS = 4
 """Tried laboratories that are judged for a sentence that does not hold in the inferred one."""
 VALUES = (0.05, 0.275, 0.5, 0.725, 0.95)
@@ -103,7 +101,7 @@ class SearchResult:
 
     @property
     def inferred(self) -> JudgedLaboratory:
-        """The best laboratory."""
+        """The best laboratory of the search."""
         return self.laboratories["inferred"]
 
     def as_json(self) -> dict[str, Any]:
@@ -224,12 +222,12 @@ class LaboratorySearch:
         """
         missing = {s.id: s for s in self.sentences if not inferred.count_true([s])}
         enough = PLAUSIBLE * len(self.sentences)
-        ranked = [one for one in _rank(state.tried) if len(one.true) >= enough]
+        ranked = [lab for lab in _rank(state.tried) if len(lab.true) >= enough]
         plausible: dict[Laboratory, tuple[str, ...]] = {}
         for name in missing:
             if any(name in ids for ids in plausible.values()):
                 continue
-            for tried in [one for one in ranked if name in one.true][:ATTEMPTS]:
+            for tried in [lab for lab in ranked if name in lab.true][:ATTEMPTS]:
                 elsewhere = {id_ for ids in plausible.values() for id_ in ids}
                 laboratory = laboratory_at(tried.fractions)
                 among = [s for s in missing.values() if s.id in tried.true and s.id not in elsewhere]

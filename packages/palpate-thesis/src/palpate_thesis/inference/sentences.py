@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from operator import itemgetter, methodcaller
 from typing import Any
 
 from palpate_thesis.claims import Sentence, experiment_sentences, rows
@@ -11,7 +12,7 @@ from palpate_thesis.figures import fig_4_02_04 as bench
 from palpate_thesis.figures import fig_6_01_05 as squares
 from palpate_thesis.figures import fig_6_06_09 as networks
 from palpate_thesis.figures import fig_6_10_17 as force
-from palpate_thesis.inference.trial import LARGEST_RATE, Trial
+from palpate_thesis.inference.trial import Trial
 
 Result = Callable[[Trial], Any]
 
@@ -33,14 +34,6 @@ def _press(surface: str, part: str) -> Result:
     return lambda trial: getattr(trial[surface], part, None)
 
 
-def _number(study: force.ForceFigure) -> Result:
-    return lambda trial: trial[study.NUMBER]
-
-
-def _answer(surface: str) -> Result:
-    return lambda trial: trial.answer(surface)
-
-
 def _item(name: str, index: int) -> Result:
     return lambda trial: None if trial[name] is None else trial[name][index]
 
@@ -56,7 +49,7 @@ def _slower(trial: Trial) -> bool:
 
 
 def _too_large(trial: Trial) -> bool:
-    answer = trial.answer("foam", LARGEST_RATE)
+    answer = trial.answer("foam", networks.RATES[-1])
     return answer is not None and networks.stuck(answer)
 
 
@@ -83,12 +76,12 @@ ON_TRIALS: Mapping[str, Sentence] = {
         for id_, sentence in _judge(_press(study.surface, "estimates"), *study.sentences).items()
     },
     **_judge(_press("foam", "estimates"), squares.ALL_AT_ONCE),
-    **_judge(_answer("foam"), *networks.FOAM, networks.ERROR),
-    **_judge(_answer("rubber"), *networks.RUBBER),
+    **_judge(methodcaller("answer", "foam"), *networks.FOAM, networks.ERROR),
+    **_judge(methodcaller("answer", "rubber"), *networks.RUBBER),
     **{
         id_: sentence
         for study in force.FORCE
-        for id_, sentence in _judge(_number(study), *study.sentences).items()
+        for id_, sentence in _judge(itemgetter(study.NUMBER), *study.sentences).items()
     },
     **_judge(_item("6.11", 0), *force.FOAM.sentences),
     **_judge(_item("6.11", 1), *force.FREE_DIRECTIONS),

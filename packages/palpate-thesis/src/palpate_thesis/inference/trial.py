@@ -8,8 +8,7 @@ from palpate.bench import Experiment, build, with_values
 from palpate.bench.summary import DONE, INTERRUPTED
 from palpate.records import Record
 from palpate_thesis.figures import fig_6_10_17 as force
-from palpate_thesis.figures.fig_4_02_04 import Switch, half_ranges, measure_switch
-from palpate_thesis.figures.fig_6_06_09 import RATES
+from palpate_thesis.figures.fig_4_02_04 import PARAMETERS, Switch, half_ranges, measure_switch
 from palpate_thesis.force_control.tracking import since_contact
 from palpate_thesis.laboratory import Laboratory
 from palpate_thesis.least_squares import press_runs
@@ -20,9 +19,6 @@ from palpate_thesis.neural_identifier.network import Identified, NetworkChoice, 
 STEPS = 5
 """Steps of the physics in a tick during a search: a quarter of those of the figures, at half the cost. They change as
 many verdicts as another draw of the noise does."""
-SWITCHED = 4.0
-"""Length of contact in figure 4.2 [s]."""
-LARGEST_RATE = RATES[-1]
 
 
 class WatchedPress(NamedTuple):
@@ -77,7 +73,7 @@ class Trial:
 
 
 def _watch_press(record: Record) -> WatchedPress:
-    rows = since_contact(record) < SWITCHED
+    rows = since_contact(record) < PARAMETERS["foam"].run.press
     early = Record({n: record[n][rows] for n in record.columns}, record.units, record.meta)
     estimates, press = press_runs.press_estimates(record), network.press_of(record, "foam")
     return WatchedPress(estimates, measure_switch(early), half_ranges(record), press)
