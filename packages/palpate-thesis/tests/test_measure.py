@@ -129,7 +129,7 @@ def test_there_is_one_count_of_claims(tmp_path, capsys):
     assert (
         f"{len(claims)} sentences about the set-up and the schemes that it cites: {good} reproduced" in page
     )
-    assert f"All {len(claims)} claims" in page
+    assert f"Verdicts of all claims: {len(claims)}" in page
     assert page.count('<article class="claim"') == len(claims)
     for row in claims:
         assert f'id="{row["id"]}"' in page

@@ -11,7 +11,7 @@ from palpate.controllers.neural import NeuralState
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim
-from palpate_thesis.drawing import LIMIT_LINE, Axes, Figure, panels
+from palpate_thesis.drawing import LIMIT_LINE, Figure, panels
 from palpate_thesis.explanations.e2_integrator import PI
 from palpate_thesis.force_control.interventions import HOLD_INTERVAL, layers, watch, without_torques
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, slot
@@ -114,7 +114,9 @@ def plot(data: Data) -> Figure:
     for (name, by_rate), color in zip(data.courses.items(), style.SERIES, strict=False):
         course = by_rate[5e-5][0]
         gains.plot(course.t, course.gain, color=color, linewidth=1.2, label=name)
-        _times(times, name, by_rate, color)
+        lost = [(rate, run.lost or DURATION) for rate, runs in by_rate.items() for run in runs]
+        look: Any = {"fillstyle": "none", "markersize": 9} if name == "foam" else {"markersize": 4}
+        times.plot(*zip(*lost, strict=True), "o", color=color, label=name, **look)
     gains.set(xlabel="time since contact [s]", ylabel="gain [N per N m]", ylim=(0.0, None))
     if data.loss is not None:
         signals = {"network's force": data.loss["memory_fx"], "contact force": data.loss["force"]}
@@ -127,12 +129,6 @@ def plot(data: Data) -> Figure:
     for axis in (weights, gains, last, times):
         style.legend(axis, ncols=2)
     return drawing
-
-
-def _times(axis: Axes, name: str, by_rate: Mapping[float, Sequence[LongRun]], color: str) -> None:
-    """Times of loss over the learning rate; a run that kept contact at the top."""
-    lost = [(rate, run.lost or DURATION) for rate, runs in by_rate.items() for run in runs]
-    axis.plot(*zip(*lost, strict=True), "o", color=color, markersize=4, label=name)
 
 
 def _course(runs: Runs, experiment: Experiment, seed: int) -> LongRun:

@@ -62,13 +62,12 @@ class LeastSquaresFigure:
 
     def plot(self, data: Data) -> Figure:
         """The thesis' six panels in its slot, with the values that it states."""
-        beside_zero = (0.0,) if self.stated is None else ()
-        calm = 0.1 if self.front == "raw" else panels.CALM
-        drawing, axes = panels.six(self.surface, data.shown, self.front, self.slot, calm, *beside_zero)
+        zero, calm = self.stated is None, 0.1 if self.front == "raw" else panels.CALM
+        drawing, axes = panels.six(self.surface, data.shown, self.front, self.slot, calm, zero)
         if self.stated is not None:
             for axis in axes:
                 axis.axvline(self.stated, **STATED)
-        for axis in axes[1:4:2] if beside_zero else ():
+        for axis in axes[1:4:2] if zero else ():
             axis.axhline(0.0, **ZERO)
         if self.slot == SLOT:
             axes[5].set_ylim(*axes[4].get_ylim())

@@ -204,7 +204,7 @@ def _coefficient(axis: Axes, c: MethodComparison, i: int) -> None:
     t = np.arange(len(c.first.matched)) * network.TICK
     by_method = {NETWORK: c.curves, SQUARES: [c.first.squares], MATCHED: [c.first.matched]}
     for method, curves in by_method.items():
-        look: Any = {"linewidth": 0.8, "alpha": 0.5} if method == NETWORK else {"linewidth": 1.2}
+        look: Any = {"linewidth": 1.0, "alpha": 0.8} if method == NETWORK else {"linewidth": 1.2}
         lines = scale * np.array([curve[:, i] for curve in curves]).T
         axis.plot(t, lines, color=COLORS[method], label=[method, *[None] * (len(curves) - 1)], **look)
     axis.axhline(scale * c.first.truth[i], **style.KNOWN, label="the surface's own")

@@ -34,7 +34,7 @@ def set_title(axis: Axes, letter: str, text: str) -> None:
 
 
 def six(
-    name: str, press: Record, front: str, slot: tuple[float, float], calm: float = CALM, *zero: float
+    name: str, press: Record, front: str, slot: tuple[float, float], calm: float = CALM, zero: bool = False
 ) -> tuple[Figure, list[Axes]]:
     """Force, displacement, their ratio, and M, B, K of one front-end on the surface of this name.
 
@@ -46,7 +46,7 @@ def six(
         front: end of the names of the columns of M, B and K.
         slot: that is drawn [s].
         calm: time from which values set the scale of a panel [s].
-        zero: a value that M, B and K are shown beside.
+        zero: True if the scales of M, B and K include zero.
     """
     drawing, axes = grid(3)
     left, right = axes[0:6:2], axes[1:6:2]
@@ -64,7 +64,7 @@ def six(
     for axis, (key, (_, scale)) in zip(right, PARAMETERS.items(), strict=True):
         values = scale * press[f"{key}_{front}"][rows]
         axis.plot(t, values, color=color, linewidth=1.1)
-        calm_limits(axis, np.array(zero), values[late])
+        calm_limits(axis, np.zeros(int(zero)), values[late])
     for axis in (left[2], right[2]):
         axis.set_xlabel("time since 5 N [s]")
     return drawing, axes
