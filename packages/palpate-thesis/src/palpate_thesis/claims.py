@@ -25,8 +25,8 @@ KINDS: Mapping[str, str] = {
     "ours": "that we add, checks and explanations",
 }
 """Subjects of the sentences that are counted together, in the order of the counts, which are never summed."""
-ENOUGH = 0.9
-"""Fraction of the runs in which a claim has to hold."""
+ENOUGH, MAJORITY = 0.9, None
+"""Fraction of the runs in which a claim has to hold, and no fraction where more than half suffice."""
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ class Sentence:
     holds: Callable[[Any], bool]  # True if it holds in one run, by the result of the figure's metric
     value: Callable[[Any], float] = lambda _: np.nan  # number of a run that its text prints
     unit: str = ""  # of that number
-    fraction: float | None = ENOUGH  # of the runs in which it has to hold; None for a majority
+    fraction: float | None = ENOUGH  # of the runs in which it has to hold; or `MAJORITY`
     numbers: Mapping[str, Any] = field(default_factory=dict)  # further values of placeholders
 
     def is_true(self, held: int, runs: int) -> bool:

@@ -10,7 +10,7 @@ from palpate.bench import load, with_values
 from palpate.bench.summary import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Sentence, ThesisClaim, claim
+from palpate_thesis.claims import MAJORITY, Sentence, ThesisClaim, claim
 from palpate_thesis.drawing import STATED, Figure, panels
 from palpate_thesis.least_squares.press_runs import nearer
 from palpate_thesis.runs import Runs
@@ -120,7 +120,7 @@ def _steady(record: Record) -> tuple[Array, Array, Array]:
     return t[last], record["force_sampled"][last], record["force_measured"][last]
 
 
-NOISE = Sentence("force-noise", lambda ranges: 1.5 <= ranges[0] <= 2.5, fraction=None)
+NOISE = Sentence("force-noise", lambda ranges: 1.5 <= ranges[0] <= 2.5, fraction=MAJORITY)
 
 
 class NoiseFigure:

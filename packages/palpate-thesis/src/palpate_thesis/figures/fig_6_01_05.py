@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate.bench import Experiment, with_values
 from palpate.records import Record
-from palpate_thesis.claims import Sentence, ThesisClaim, claim
+from palpate_thesis.claims import MAJORITY, Sentence, ThesisClaim, claim
 from palpate_thesis.drawing import STATED, ZERO, Figure
 from palpate_thesis.least_squares import panels, press_runs
 from palpate_thesis.least_squares.press_runs import FIRST, SLOT, PressEstimates, press_estimates
@@ -83,11 +83,9 @@ def _settles(surface: str, limit: float) -> list[Sentence]:
         def time(press: PressEstimates) -> float:
             return float(getattr(press, f"settled_{key}"))
 
-        id_, numbers = (
-            f"least-squares-{surface}-settles.{key}",
-            {"key": key, "limit": limit, "half": HALF_DIGIT},
-        )
-        return Sentence(id_, lambda press: time(press) < limit + HALF_DIGIT, time, "s", None, numbers)
+        numbers = {"key": key, "limit": limit, "half": HALF_DIGIT}
+        id_ = f"least-squares-{surface}-settles.{key}"
+        return Sentence(id_, lambda press: time(press) < limit + HALF_DIGIT, time, "s", MAJORITY, numbers)
 
     return [settles(key) for key in "KBM"]
 
@@ -109,11 +107,11 @@ def _level(surface: str, stiffness: float, ratio: float, digit: float) -> list[S
 
     limits = {"least": 100.0 * least, "most": 100.0 * most}
     return [
-        Sentence(id_, lambda p: least <= p.apart <= most, lambda p: 100.0 * p.apart, "%", None, limits),
-        Sentence(f"{id_}.K", at_level, lambda p: 1e-3 * p.K, "kN/m", None),
-        Sentence(f"{id_}.B", is_plausible, lambda p: p.B, "N s/m", None),
-        Sentence(f"{id_}.M", lambda p: p.M < 0.0, lambda p: p.M, "kg", None),
-        Sentence(f"single-sample-ratios.{surface}", is_vague, fraction=None),
+        Sentence(id_, lambda p: least <= p.apart <= most, lambda p: 100.0 * p.apart, "%", MAJORITY, limits),
+        Sentence(f"{id_}.K", at_level, lambda p: 1e-3 * p.K, "kN/m", MAJORITY),
+        Sentence(f"{id_}.B", is_plausible, lambda p: p.B, "N s/m", MAJORITY),
+        Sentence(f"{id_}.M", lambda p: p.M < 0.0, lambda p: p.M, "kg", MAJORITY),
+        Sentence(f"single-sample-ratios.{surface}", is_vague, fraction=MAJORITY),
     ]
 
 
@@ -124,9 +122,9 @@ def is_plausible(press: PressEstimates) -> bool:
 
 _RAW = "least-squares-raw-signals"
 RAW = (
-    Sentence(f"{_RAW}.M", lambda p: p.M_raw < 0.0, lambda p: p.M_raw, "kg", None),
-    Sentence(f"{_RAW}.B", lambda p: p.B_raw < 0.0, lambda p: p.B_raw, "N s/m", None),
-    Sentence(f"{_RAW}.K", lambda p: abs(p.apart_raw) < NEAR, lambda p: 100.0 * p.apart_raw, "%", None),
+    Sentence(f"{_RAW}.M", lambda p: p.M_raw < 0.0, lambda p: p.M_raw, "kg", MAJORITY),
+    Sentence(f"{_RAW}.B", lambda p: p.B_raw < 0.0, lambda p: p.B_raw, "N s/m", MAJORITY),
+    Sentence(f"{_RAW}.K", lambda p: abs(p.apart_raw) < NEAR, lambda p: 100.0 * p.apart_raw, "%", MAJORITY),
 )
 SHOWS: Mapping[str, Callable[[PressEstimates], bool]] = {
     "K in 0.12 s": lambda f: f.settled_K <= 0.12,
@@ -138,7 +136,7 @@ SHOWS: Mapping[str, Callable[[PressEstimates], bool]] = {
 }
 """Properties of a foam that figures 6.1 to 6.3 show."""
 ALL_AT_ONCE = Sentence(
-    "least-squares-one-foam", lambda p: all(shows(p) for shows in SHOWS.values()), fraction=None
+    "least-squares-one-foam", lambda p: all(shows(p) for shows in SHOWS.values()), fraction=MAJORITY
 )
 
 

@@ -12,7 +12,7 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.studies.metrics.following import LIMIT, SHARE
 from palpate.studies.metrics.window import SETTLE, rms
-from palpate_thesis.claims import Sentence, ThesisClaim, claim, spread
+from palpate_thesis.claims import MAJORITY, Sentence, ThesisClaim, claim, spread
 from palpate_thesis.drawing import Figure, force_figure, panels
 from palpate_thesis.force_control import tracking
 from palpate_thesis.force_control.tracking import FOLLOWS, Tracking, describe, hybrid, since_contact, slot
@@ -231,7 +231,7 @@ ADAPTS = Sentence(
     lambda run: 2.5 <= run.adapted <= 7.5,
     lambda run: run.adapted,
     "s",
-    None,
+    MAJORITY,
     {"smoothed": SMOOTHED, "limit": LIMIT},
 )
 LATE, EARLY = tracking.tracking(*TEN_SECONDS_ON), tracking.tracking(*FIRST)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from operator import itemgetter, methodcaller
 from typing import Any
 
-from palpate_thesis.claims import Sentence, experiment_sentences, rows
+from palpate_thesis.claims import MAJORITY, Sentence, experiment_sentences, rows
 from palpate_thesis.figures import fig_4_02_04 as bench
 from palpate_thesis.figures import fig_6_01_05 as squares
 from palpate_thesis.figures import fig_6_06_09 as networks
@@ -61,10 +61,10 @@ def _sticks(trial: Trial) -> bool:
 ON_TRIALS: Mapping[str, Sentence] = {
     **_judge(
         lambda trial: trial,
-        Sentence("switch-at-5N", _both_clean, fraction=None),
+        Sentence("switch-at-5N", _both_clean, fraction=MAJORITY),
         Sentence("network-learning-rate.slower", _slower),
         Sentence("network-learning-rate.too-large", _too_large),
-        Sentence("neural-free-directions.sticks", _sticks, fraction=None),
+        Sentence("neural-free-directions.sticks", _sticks, fraction=MAJORITY),
     ),
     **_judge(
         _press("foam", "switch"), Sentence("switch-at-5N.threshold", lambda s: not s.early, fraction=1.0)
