@@ -14,15 +14,15 @@ ROOM = 1.005
 """Factor by which a figure may exceed its budget, so that two people can add a line on the same day."""
 BUDGET = {
     "distributions": 2,
-    "files": 424,
-    "tokens": 582800,
+    "files": 414,
+    "tokens": 577100,
     "tokens in a line of code": 10.34,
-    "lines of tests": 49528,
+    "lines of tests": 49210,
     "lines of benchmarks": 12778,
     "words in documents": 45000,
     "private imports from another distribution": 0,
     "classes of one name": 4,
-    "modules without a test of their name": 209,
+    "modules without a test of their name": 190,
     "functions in _of": 89,
     "short docstrings": 0,
 }

@@ -23,7 +23,7 @@ from scipy.linalg import expm
 from palpate.arrays import Array
 from palpate.controllers import Neural
 from palpate.force.lyapunov import common
-from palpate_thesis.figures.fig_4_03 import TICK, TIP, LoopParameters
+from palpate_thesis.force_control.linear_loop import TICK, TIP, LoopParameters
 
 LOW, HIGH, SHARE = 300.0, 3e6, 0.99
 """Softest surface and stiffest that is looked at [N/m], and how far up the exact interval the proof goes."""

@@ -8,8 +8,7 @@ import pytest
 from palpate.controllers import hybrid, neural
 from palpate.identifiers import neural_probe
 from palpate_thesis.blocks import blocks_of, read_blocks
-from palpate_thesis.figures import fig_4_03
-from palpate_thesis.figures import fig_4_05_5_03 as diagrams
+from palpate_thesis.figures import fig_4_03_5_03 as diagrams
 
 SOURCE = inspect.getsource(neural)
 
@@ -35,7 +34,7 @@ def test_the_identifier_learns_from_what_its_answer_lacks():
     [
         (neural, "Neural.step", diagrams.CONTROLLER),
         (neural_probe, "absorb", diagrams.IDENTIFIER),
-        (hybrid, "Hybrid.step", fig_4_03.PLACES),
+        (hybrid, "Hybrid.step", diagrams.HYBRID),
     ],
 )
 def test_every_step_has_a_place_and_every_place_a_step(module, function, places):
@@ -57,8 +56,8 @@ def test_a_new_step_is_a_new_block():
 
 def test_networks_are_drawn_with_all_their_neurons_and_inputs():
     for study, neurons, weights in (
-        (diagrams.STUDIES[1], 24, 9 * 12 + 12 * 3),
-        (diagrams.STUDIES[3], 8, 3 * 4 + 4),
+        (diagrams.STUDIES[2], 24, 9 * 12 + 12 * 3),
+        (diagrams.STUDIES[4], 8, 3 * 4 + 4),
     ):
         (axis,) = study.plot(None).axes
         dots = [line for line in axis.lines if line.get_marker() == "o"]

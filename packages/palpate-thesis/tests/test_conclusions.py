@@ -9,16 +9,15 @@ from palpate_thesis.figures import fig_7_01
 from palpate_thesis.force_control import gain_sets
 from palpate_thesis.force_control.tracking import Tracking, tracking
 from palpate_thesis.laboratory import load_laboratory
-from palpate_thesis.neural_identifier import side_by_side
-from palpate_thesis.neural_identifier.network import NetworkPress
-from palpate_thesis.neural_identifier.side_by_side import Identified, Pair, SharedPress
+from palpate_thesis.neural_identifier.network import Identified, NetworkPress, identified
+from palpate_thesis.neural_identifier.side_by_side import Pair
 from palpate_thesis.runs import Runs
 
 TRUTH = np.array([6000.0, 200.0, 0.1])
 
 
 def answer(K=6000.0, B=200.0, M=0.1, settled=0.1):
-    return Identified(K, B, M, settled, settled, settled, 0.0, 6000.0, TRUTH)
+    return Identified(K, B, M, settled, settled, settled, 0.0, 6000.0, 200.0, TRUTH, 0.0)
 
 
 def test_an_answer_is_the_mean_of_the_last_half_second():
@@ -26,8 +25,9 @@ def test_an_answer_is_the_mean_of_the_last_half_second():
     K = np.where(np.arange(n) < 250, 3000.0, 6000.0)
     K[-500::2] += 60.0
     curve = np.column_stack([K, np.full(n, 200.0), np.full(n, -1.0)])
-    press = NetworkPress("foam", np.zeros((n, 3)), np.zeros(n), 6030.0, np.zeros((n, 3)))
-    given = side_by_side.identified(SharedPress(press, curve, TRUTH), curve)
+    zeros = np.zeros((n, 3))
+    press = NetworkPress("foam", zeros, np.zeros(n), 6030.0, zeros, curve, TRUTH)
+    given = identified(press, curve)
     assert pytest.approx(6030.0) == given.K
     assert given.over == pytest.approx(1.0)
     assert given.ripple == pytest.approx(30.0 / 6030.0)
@@ -62,12 +62,8 @@ def test_gains_are_tuned_by_the_least_error_of_a_run_that_kept_contact():
     def run(rms, lost=0):
         return Tracking(rms, rms, 0.0, 0.0, lost)
 
-    errors = {
-        ("h", "foam", "low"): run(2.0),
-        ("h", "foam", "high"): run(0.1, 1),
-        ("h", "foam", "mid"): run(1.0),
-    }
-    assert gain_sets.best_gains(errors)[2] == "mid"
+    errors = {"low": run(2.0), "high": run(0.1, 1), "mid": run(1.0)}
+    assert gain_sets.best_gains(errors) == "mid"
     assert gain_sets.TUNING_SEED not in Runs(range(1000)).seeds
 
 
@@ -77,7 +73,7 @@ def test_a_plausible_laboratory_shows_why_hybrid_gains_have_to_be_changed():
     laboratory = load_laboratory(plausible_laboratories()["conclusion-gains.hybrid"])
     experiments = {
         (name, surface): with_values(e, changes)
-        for name, (changes, _) in gain_sets.ONE_SET.items()
+        for name, (changes,) in ((n, grid.values()) for n, grid in gain_sets.ONE_SET.items())
         for surface, e in gain_sets.SURFACES.items()
     }
     results = Runs(range(2), laboratory=laboratory).by_name(experiments, tracking(*gain_sets.JUDGED))

@@ -1,4 +1,4 @@
-"""What the figures of the controllers stand on: the linear force loop."""
+"""The linear force loop, against its transfer functions and the bench's own parts stepped one by one."""
 
 from functools import reduce
 
@@ -9,7 +9,7 @@ from scipy import signal
 from palpate.bench import load, with_values
 from palpate.instruments import force_sensor
 from palpate.signals.filters import butterworth2
-from palpate_thesis.figures.fig_4_03 import LoopParameters
+from palpate_thesis.force_control.linear_loop import LoopParameters
 from palpate_thesis.runs import SHORT
 
 FOAM = with_values(load("foam-hybrid"), {**SHORT, "run.press": 1.2})

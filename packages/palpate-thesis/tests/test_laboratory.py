@@ -19,13 +19,13 @@ from palpate_thesis.claims import (
     count_verdicts,
     experiment_sentences,
     plausible_laboratories,
-    tables,
+    rows,
 )
 from palpate_thesis.figure import studies, study
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, SINE
 from palpate_thesis.inference import search
 from palpate_thesis.inference.search import GENERATION, STATE, LaboratorySearch
-from palpate_thesis.inference.sentences import HOLDS, halves, sentences
+from palpate_thesis.inference.sentences import ON_TRIALS, halves, sentences
 from palpate_thesis.inference.trial import Trial
 from palpate_thesis.laboratory import (
     BENCH,
@@ -101,7 +101,8 @@ def test_every_unknown_enters_some_experiment(unknown: Unknown):
 def test_the_identifiers_unknowns_enter_its_answer():
     t = np.arange(4000) * 1e-3
     inputs = np.column_stack([4e-3 * t / 4.0, np.full(4000, 1e-3), np.zeros(4000)])
-    press = NetworkPress("foam", inputs, 20.0 * t / 4.0, 5000.0, np.zeros((4000, 3)))
+    none = np.zeros((4000, 3))
+    press = NetworkPress("foam", inputs, 20.0 * t / 4.0, 5000.0, none, none, none[0])
     base = Trial(Laboratory(start=1.0)).answer_for(press)
     for of in ({"amplitude": 80.0}, {"weights": 1.5}, {"output_sum": 1.0}, {"start": 2.0}):
         assert Trial(Laboratory(**{"start": 1.0, **of})).answer_for(press) != base
@@ -113,7 +114,7 @@ def test_foams_of_all_laws_sink_in_alike_from_5_to_20_N():
         depth = [(f / s["stiffness"]) ** (1.0 / n) for f in (5.0, 20.0)]
         assert 15.0 / (depth[1] - depth[0]) == pytest.approx(5200.0)
         assert s["damping"] * depth[1] ** n == pytest.approx(200.0)
-        assert press_runs.own_damping(s) == pytest.approx(200.0)
+        assert press_runs.own_values(s)["B"] == pytest.approx(200.0)
     assert Laboratory(foam_law=STIFFENING).adapt(FOAM).surface.exponent == 1.5
     assert Laboratory(foam_law=RELAXING, foam_branch=2.0).adapt(
         FOAM
@@ -159,9 +160,9 @@ def test_a_laboratory_has_the_other_values_of_its_base(tmp_path):
 
 
 def test_sentences_are_claims_of_their_figures_and_each_has_a_law():
-    assert {s.id for s in sentences()} == set(HOLDS)
-    assert len(sentences()) == len(HOLDS)
-    assert {s.figure for s in sentences()} <= {s.NUMBER for s in studies()}
+    assert {s.id for s in sentences()} == set(ON_TRIALS)
+    assert len(sentences()) == len(ON_TRIALS)
+    assert {rows()[s.id]["figure"] for s in sentences()} <= {s.NUMBER for s in studies()}
 
 
 def test_a_trial_of_the_bench_agrees_with_the_figures():
@@ -200,7 +201,7 @@ def test_the_search_improves_on_the_prior(tmp_path, rule):
     assert result.tried == len(counts) == 256
     assert max(counts[64:]) > max(counts[:64])
     assert result.inferred.count_true(sentences()) == len(sentences())
-    assert 0 < result.bench.count_true(sentences()) < len(sentences())
+    assert 0 < result.laboratories["hand-chosen bench"].count_true(sentences()) < len(sentences())
 
 
 def test_an_interrupted_search_ends_as_one_that_was_not(tmp_path, rule):
@@ -285,7 +286,11 @@ def test_claims_are_counted_by_kind():
 def test_there_are_49_sentences_about_the_experiments_and_each_has_its_text():
     assert experiment_sentences() == {s.id for s in sentences()}
     assert len(experiment_sentences()) == 49
-    assert experiment_sentences() <= set(tables()["claims"])
+    assert {name: len(half) for name, half in halves().items()} == {
+        "calibration": 22,
+        "validation": 27,
+        "all": 49,
+    }
 
 
 @pytest.mark.parametrize(

@@ -11,17 +11,15 @@ from palpate.bench.summary import CONTACT, LOST
 from palpate.records import Record
 from palpate.studies.metrics.following import LIMIT
 from palpate.studies.metrics.window import SETTLE
+from palpate_thesis.claims import often
 from palpate_thesis.explanations import e2_integrator, e3_divergence
-from palpate_thesis.figures import fig_6_10, fig_6_11_17, fig_6_14, fig_6_15
+from palpate_thesis.figures import fig_6_10_17
 from palpate_thesis.force_control.tracking import (
     FOAM,
-    RUBBER,
     Tracking,
-    following,
     tracking,
-    variations,
 )
-from palpate_thesis.runs import move_wall, rougher
+from palpate_thesis.runs import rougher
 
 TICK = 1e-3
 
@@ -75,39 +73,33 @@ def test_a_run_without_the_window_never_follows():
 
 def test_nine_of_ten_are_enough_and_eight_are_not():
     good, bad = Tracking(0.1, 0.1, 0.0, 0.0, 0), Tracking(9.0, 9.0, 0.5, 0.0, 0)
-    assert following([good] * 9 + [bad])
-    assert not following([good] * 8 + [bad] * 2)
+    assert often(run.follows for run in [good] * 9 + [bad])
+    assert not often(run.follows for run in [good] * 8 + [bad] * 2)
 
 
-def test_variations_change_what_they_say_and_nothing_else():
-    there = with_values(FOAM, move_wall(FOAM, 0.40))
-    assert there.wall.x == 0.40
-    assert there.wall.x - there.robot.start[0] == pytest.approx(FOAM.wall.x - FOAM.robot.start[0])
-    assert there.wall.x - there.approach.first == pytest.approx(FOAM.wall.x - FOAM.approach.first)
-    assert there.surface == FOAM.surface
+def test_rougher_joints_have_another_friction_and_nothing_else():
     rough = with_values(FOAM, rougher(FOAM, 2.0))
     assert rough.friction.coulomb == tuple(2.0 * f for f in FOAM.friction.coulomb)
-    assert set(variations(FOAM)) - set(variations(RUBBER)) == {"relaxing\nfoam"}
-    assert all(e.controller == FOAM.controller for e in variations(FOAM).values())
+    assert (rough.controller, rough.surface) == (FOAM.controller, FOAM.surface)
 
 
 def test_ends_of_intervals_are_told_apart_by_level():
-    ends = fig_6_10.interval_ends(pressed(lambda t, d: np.where(d == 20.0, 16.0, 12.5)))
+    ends = fig_6_10_17.interval_ends(pressed(lambda t, d: np.where(d == 20.0, 16.0, 12.5)))
     assert (ends.high, ends.low) == pytest.approx((-4.0, 2.5))
-    assert fig_6_10.misses(ends)
-    assert not fig_6_10.misses(fig_6_10.Ends(-4.0, 0.5))
+    assert fig_6_10_17.misses(ends)
+    assert not fig_6_10_17.misses(fig_6_10_17.Ends(-4.0, 0.5))
 
 
 def test_the_course_of_the_error_has_a_value_for_each_whole_cycle():
     record = pressed(lambda t, d: d - np.where(t < 10.0, 2.0, 1.0), seconds=17.0)
-    assert fig_6_14.cycle_errors(record) == pytest.approx([2.0, 2.0, 1.0])
+    assert fig_6_10_17.course(record).errors == pytest.approx([2.0, 2.0, 1.0])
 
 
 def test_an_error_that_changes_sign_is_still_an_error():
     record = pressed(lambda t, d: d, seconds=15.0)
     t = record["t"] - 0.2
     record.columns["y"][:] = np.where(np.floor(t / 2.5) % 2 == 0, 2e-3, -2e-3)
-    assert fig_6_15.measure_free_errors(record).y == pytest.approx(2e-3)
+    assert fig_6_10_17.measure_free_errors(record).y == pytest.approx(2e-3)
 
 
 @pytest.mark.parametrize("restart", [0.0, 5.0])
@@ -118,9 +110,8 @@ def test_the_time_of_adapting_is_found_whether_the_clock_restarts_or_not(adapts,
         return d + sine - np.where(t < adapts, 5.0, 0.0)
 
     record = pressed(force, seconds=20.0)
-    assert fig_6_11_17.adapted_at(fig_6_11_17.away_from_settled(record)) == pytest.approx(
-        adapts, abs=fig_6_11_17.SMOOTHED
-    )
+    adapted = fig_6_10_17.adapting(record).adapted
+    assert adapted == pytest.approx(adapts, abs=fig_6_10_17.SMOOTHED)
 
 
 def test_the_gain_of_an_integrator_is_found_under_noise():

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from palpate_thesis.figures import fig_6_06
-from palpate_thesis.neural_identifier import claims, network
-from palpate_thesis.neural_identifier.network import NetworkAnswer, NetworkChoice, NetworkPress
+from palpate_thesis.figures import fig_6_06_09
+from palpate_thesis.neural_identifier import network
+from palpate_thesis.neural_identifier.network import Identified, NetworkChoice, NetworkPress
 
 STIFFNESS = 6000.0
-GOOD = NetworkAnswer(
+GOOD = Identified(
     K=6600.0,
     B=200.0,
     M=0.1,
@@ -18,6 +18,8 @@ GOOD = NetworkAnswer(
     settled_B=0.6,
     settled_M=0.6,
     error_gone=0.6,
+    ripple=0.0,
+    truth=np.array([6000.0, 200.0, 0.1]),
 )
 
 
@@ -28,7 +30,8 @@ def spring(offset: float = 0.0) -> NetworkPress:
     v = np.where(t < 0.1, 0.03, 0.0)
     force = offset + STIFFNESS * x
     ratio = float(force[-1] / x[-1])
-    return NetworkPress("foam", np.column_stack([x, v, 0.0 * t]), force, ratio, np.ones((len(t), 3)))
+    ones = np.ones((len(t), 3))
+    return NetworkPress("foam", np.column_stack([x, v, 0.0 * t]), force, ratio, ones, ones, ones[0])
 
 
 def test_an_error_is_gone_when_its_running_mean_stays_small():
@@ -55,15 +58,14 @@ def test_a_probe_beyond_what_was_pressed_is_warned_of():
     assert {code for code, _ in probe.probe(displacement=4e-3).warnings} == {"probe-outside-learned"}
 
 
-def test_a_cut_press_has_the_ratio_of_its_own_end():
-    press = spring(offset=5.0)
-    short = network.cut(press, 1.0)
-    assert len(short.force) == len(short.squares) == 1000
-    assert short.ratio == pytest.approx(23.0 / 3e-3)
+def judge(answers):
+    """The claims of figure 6.7 from answers of its runs."""
+    figure = next(one for one in fig_6_06_09.STUDIES if one.NUMBER == "6.7")
+    return figure.check(fig_6_06_09.Data(spring(), {}, {1e-4: answers}))
 
 
 def test_every_part_holds_of_an_answer_as_the_thesis_has_it():
-    found = claims.claims("foam", [GOOD] * 10, claims.FOAM)
+    found = judge([GOOD] * 10)
     assert [c.id for c in found] == [
         f"network-foam.{s}" for s in ("time-K", "time-B", "time-M", "K", "B", "M")
     ]
@@ -84,20 +86,20 @@ def test_every_part_holds_of_an_answer_as_the_thesis_has_it():
 )
 def test_a_part_differs_alone_when_its_own_number_does(suffix, change):
     bad = GOOD._replace(**change)
-    found = claims.claims("foam", [GOOD] * 8 + [bad] * 2, claims.FOAM)
+    found = judge([GOOD] * 8 + [bad] * 2)
     assert [c.id for c in found if c.verdict != "reproduced"] == [f"network-foam.{suffix}"]
 
 
 def test_a_rate_is_slower_only_if_every_smaller_one_takes_longer():
-    times = dict(zip(fig_6_06.SMALLER, (0.1, 0.2, 0.6, 2.0), strict=True))
+    times = dict(zip(fig_6_06_09.SMALLER, (0.1, 0.2, 0.6, 2.0), strict=True))
     by_rate = {rate: [GOOD._replace(error_gone=t)] for rate, t in times.items()}
-    assert fig_6_06.slower_throughout(by_rate) == [True]
-    by_rate[fig_6_06.SMALLER[2]] = [GOOD._replace(error_gone=0.15)]
-    assert fig_6_06.slower_throughout(by_rate) == [False]
+    assert fig_6_06_09.slower_throughout(by_rate) == [True]
+    by_rate[fig_6_06_09.SMALLER[2]] = [GOOD._replace(error_gone=0.15)]
+    assert fig_6_06_09.slower_throughout(by_rate) == [False]
 
 
 def test_a_rate_is_too_large_when_all_beyond_it_are_stuck_too():
     stuck = [GOOD._replace(error_gone=np.inf)]
-    by_rate = {rate: stuck if rate in (1e-3, 3e-2, 1e-1) else [GOOD] for rate in fig_6_06.RATES}
-    assert fig_6_06.stuck_from(by_rate) == 3e-2
-    assert fig_6_06.stuck_from({rate: [GOOD] for rate in fig_6_06.RATES}) == np.inf
+    by_rate = {rate: stuck if rate in (1e-3, 3e-2, 1e-1) else [GOOD] for rate in fig_6_06_09.RATES}
+    assert fig_6_06_09.stuck_from(by_rate) == 3e-2
+    assert fig_6_06_09.stuck_from({rate: [GOOD] for rate in fig_6_06_09.RATES}) == np.inf

@@ -28,14 +28,10 @@ def test_it_opens_alone_and_is_no_wider_than_the_screen(browser, index, width, s
 
 def test_claims_of_one_verdict_are_shown(browser, index):
     with open_page(browser, index) as page:
-        every = page.locator(".claim").count()
-        page.click("#filter button[value=contradicted]")
-        left = page.locator(".claim:visible").count()
-        assert 0 < left < every
-        assert page.locator("#shown").text_content() == f"{left} of {every} shown"
-        page.fill("#word", "no claim has this")
-        assert page.locator(".claim:visible").count() == 0
-        assert page.locator("nav .line:visible").count() == 0
-        page.fill("#word", "")
-        page.click("#filter button[value='']")
-        assert page.locator(".claim:visible").count() == every
+        page.click("#verdicts summary")
+        every = page.locator("#verdicts tbody tr").count()
+        assert every == page.locator(".claim").count()
+        page.fill("#verdicts .sift", "contradicted")
+        assert 0 < page.locator("#verdicts tbody tr:visible").count() < every
+        page.fill("#verdicts .sift", "no claim has this")
+        assert page.locator("#verdicts tbody tr:visible").count() == 0

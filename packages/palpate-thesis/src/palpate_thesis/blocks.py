@@ -29,21 +29,13 @@ EQUATION = re.compile(r"#.*?(\(\d\.\d+\))")
 
 
 class Block(NamedTuple):
-    """One step of a law.
+    """One step of a law."""
 
-    Args:
-        name: of the value that the step computes; of the function, if it only changes a memory; or "return".
-        law: name of the function that computes the value; empty for a formula.
-        formula: right-hand side, in the letters of the thesis.
-        equation: number in the thesis, "(4.19)"; empty if the source names none.
-        inputs: names of other blocks, and of what the law is given ("sense.x").
-    """
-
-    name: str
-    law: str
-    formula: str
-    equation: str
-    inputs: frozenset[str]
+    name: str  # of the value that the step computes; of a function that only changes a memory; "return"
+    law: str  # name of the function that computes the value; empty for a formula
+    formula: str  # right-hand side, in the letters of the thesis
+    equation: str  # number in the thesis, "(4.19)"; empty if the source names none
+    inputs: frozenset[str]  # names of other blocks, and of what the law is given ("sense.x")
 
 
 class _Reader:
@@ -118,12 +110,7 @@ def _is_given(node: ast.expr) -> bool:
 
 
 def read_blocks(source: str, function: str) -> dict[str, Block]:
-    """Blocks of a function by name, in the order of its steps.
-
-    Args:
-        source: text of its module.
-        function: its name, after that of its class: "Neural.step".
-    """
+    """Blocks of a function, "Neural.step" in the source of its module, by name in the order of its steps."""
     body: list[ast.stmt] = ast.parse(source).body
     for name in function.split("."):
         body = next(n for n in body if isinstance(n, ast.ClassDef | ast.FunctionDef) and n.name == name).body
@@ -131,14 +118,6 @@ def read_blocks(source: str, function: str) -> dict[str, Block]:
     for statement in body:
         reader.read(statement)
     return reader.blocks
-
-
-def values_written(module: ModuleType, function: str) -> list[str]:
-    """Right-hand sides that a function assigns, in their order: ``["x.x", "x.y"]``."""
-    tree = ast.parse(inspect.getsource(module))
-    body = next(n.body for n in tree.body if isinstance(n, ast.FunctionDef) and n.name == function)
-    values = [statement.value for statement in body if isinstance(statement, ast.Assign)]
-    return [ast.unparse(part) for v in values for part in (v.elts if isinstance(v, ast.Tuple) else [v])]
 
 
 def blocks_of(module: ModuleType, function: str) -> dict[str, Block]:

@@ -2,7 +2,7 @@
 
 import tomllib
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
@@ -14,6 +14,7 @@ from palpate.report.page import Table
 
 Verdict = Literal["reproduced", "reproduced in a plausible laboratory", "contradicted", "not checkable"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
+TEXTS = ("source", "claim", "thesis", "measured", "tolerance", "note")
 Of = Literal["experiment", "cited", "ours"]
 CONCLUSION = "conclusion"
 """Beginning of the names of the claims of section 7.1, which are of the experiments, too, and counted apart."""
@@ -24,56 +25,35 @@ KINDS: Mapping[str, str] = {
     "ours": "that we add, checks and explanations",
 }
 """Subjects of the sentences that are counted together, in the order of the counts, which are never summed."""
-ENOUGH = 0.9
-"""Fraction of the runs in which a claim has to hold."""
+ENOUGH, MAJORITY = 0.9, None
+"""Fraction of the runs in which a claim has to hold, and no fraction where more than half suffice."""
 
 
 @dataclass(frozen=True)
 class ThesisClaim:
-    """One row of claims.json.
+    """One row of claims.json."""
 
-    Args:
-        id: the claim, "least-squares-foam-level"; with a suffix, ".K", if one sentence makes several claims.
-        source: where the thesis says it.
-        claim: its statement, in our words.
-        thesis: its value, with unit; or "in words" where it gives none.
-        measured: ours, with spread over the seeds, unit and seeds: see `spread`.
-        tolerance: the threshold that decides, stated before looking: "within 10 % of the value at 4 s by 0.12 s".
-        verdict: one of `VERDICTS`.
-        note: one paragraph: the reason, the chosen values and their effect, the range of validity.
-        of: sentence of the thesis about its experiments; about its set-up or a cited scheme; or ours.
-    """
-
-    id: str
-    source: str
-    claim: str
-    thesis: str
-    measured: str
-    tolerance: str
-    verdict: Verdict
-    note: str
-    of: Of = "ours"
+    id: str  # the claim, "least-squares-foam-level"; with a suffix, ".K", if one sentence makes several claims
+    source: str  # where the thesis says it
+    claim: str  # its statement, in our words
+    thesis: str  # its value, with unit; the claim itself where it gives none
+    measured: str  # ours, with spread over the seeds, unit and seeds: see `spread`
+    tolerance: str  # the threshold that decides, stated before looking
+    verdict: Verdict  # one of `VERDICTS`
+    note: str  # one paragraph: the reason, the chosen values and their effect, the range of validity
+    of: Of = "ours"  # of the thesis about its experiments, or its set-up and cited schemes; or ours
 
 
 @dataclass
 class Done:
-    """Study that has been measured, with its claims.
+    """Study that has been measured, with its claims."""
 
-    Args:
-        number, title, caption: of its figure.
-        claims: decided by it.
-        seconds: that it took.
-        beside: what the folded figure shows; empty without one.
-        tables: shown under the figure.
-    """
-
-    number: str
+    number: str  # of its figure
     title: str
     caption: str
-    claims: list[ThesisClaim]
-    seconds: float
-    beside: str = ""
-    tables: list[Table] = field(default_factory=list)
+    claims: list[ThesisClaim]  # decided by it
+    seconds: float  # that it took
+    tables: list[Table] = field(default_factory=list)  # shown under the figure
 
 
 def verdict_of(id_: str, holds: bool) -> Verdict:
@@ -97,14 +77,8 @@ def plausible_laboratories() -> Mapping[str, str]:
 
 @cache
 def experiment_sentences() -> frozenset[str]:
-    """Names of the sentences of the thesis about its experiments: those of halves.toml."""
-    text = (resources.files("palpate_thesis") / "inference" / "halves.toml").read_text("utf-8")
-    figures = tomllib.loads(text).values()
-    return frozenset(
-        id_
-        for figure in figures
-        for id_ in (*figure.get("states", ()), *figure["claims"], *figure.get("besides", ()))
-    )
+    """Names of the sentences of the thesis about its experiments: those of figures that are in a half."""
+    return frozenset(id_ for id_, row in rows().items() if "half" in row)
 
 
 def often(holds: Iterable[bool]) -> bool:
@@ -146,38 +120,75 @@ class _Spread(list[Any]):
 
 
 @cache
-def tables() -> Mapping[str, Mapping[str, Mapping[str, str]]]:
-    """Figures and claims of claims.toml, each text on one line."""
+def figures() -> Mapping[str, Mapping[str, Any]]:
+    """Figures of claims.toml with their claims, each text on one line."""
     tables = tomllib.loads((resources.files("palpate_thesis") / "claims.toml").read_text("utf-8"))
+    return {number: _on_one_line(figure) for number, figure in tables.items()}
+
+
+def _on_one_line(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _on_one_line(item) for key, item in value.items()}
+    return " ".join(value.split()) if isinstance(value, str) else value
+
+
+@cache
+def rows() -> Mapping[str, Mapping[str, Any]]:
+    """Claims of claims.toml: what a row lacks comes from the row named in `like`, then from its figure."""
+    tables = {id_: row for figure in figures().values() for id_, row in figure.get("claims", {}).items()}
+
+    def complete(row: Mapping[str, Any]) -> Mapping[str, Any]:
+        return {**complete(tables[row["like"]]), **row} if "like" in row else row
+
     return {
-        kind: {key: {name: " ".join(text.split()) for name, text in row.items()} for key, row in rows.items()}
-        for kind, rows in tables.items()
+        id_: {**figure, **complete(row), "figure": number}
+        for number, figure in figures().items()
+        for id_, row in figure.get("claims", {}).items()
     }
 
 
 def texts(number: str) -> tuple[str, str]:
     """Title and caption of a figure."""
-    figure = tables()["figures"][number]
-    return figure["title"], figure["caption"]
+    return figures()[number]["title"], figures()[number]["caption"]
 
 
 def claim(id_: str, holds: bool | Verdict, /, **numbers: Any) -> ThesisClaim:
     """A row of claims.json.
 
     Args:
-        id_: its key in claims.toml. A row there takes texts that it lacks from the row named in `like`.
+        id_: its key in claims.toml.
         holds: True if the claim is reproduced; or its verdict.
         numbers: values of the placeholders in its texts; a list with one value a seed is written as its spread.
     """
-    row = dict(tables()["claims"][id_])
-    while "like" in row:
-        row = {**tables()["claims"][row.pop("like")], **row}
+    row = {"thesis": rows()[id_]["claim"], "measured": "{values}", **rows()[id_]}
     values = {k: _Spread(v) if isinstance(v, list | np.ndarray) else v for k, v in numbers.items()}
-    texts = {name: text.format(**values) for name, text in row.items()}
-    filled: dict[str, Any] = {"of": "ours", "thesis": "in words", **texts}
-    if id_ in experiment_sentences() or id_.startswith(CONCLUSION):
-        filled["of"] = "experiment"
-    return ThesisClaim(id=id_, verdict=holds if isinstance(holds, str) else verdict_of(id_, holds), **filled)
+    filled = {name: row[name].format(**values) for name in TEXTS}
+    of: Of = "experiment" if "half" in row or id_.startswith(CONCLUSION) else row.get("of", "ours")
+    verdict = holds if isinstance(holds, str) else verdict_of(id_, holds)
+    return ThesisClaim(id=id_, verdict=verdict, of=of, **filled)
+
+
+@dataclass(frozen=True, eq=False)
+class Sentence:
+    """A sentence of the thesis as a condition on one run."""
+
+    id: str  # of its claim
+    holds: Callable[[Any], bool]  # True if it holds in one run, by the result of the figure's metric
+    value: Callable[[Any], float] = lambda _: np.nan  # number of a run that its text prints
+    unit: str = ""  # of that number
+    fraction: float | None = ENOUGH  # of the runs in which it has to hold; or `MAJORITY`
+    numbers: Mapping[str, Any] = field(default_factory=dict)  # further values of placeholders
+
+    def is_true(self, held: int, runs: int) -> bool:
+        """True if the sentence holds in enough of the runs."""
+        return 2 * held > runs if self.fraction is None else held >= self.fraction * runs
+
+    def judge(self, results: Sequence[Any], surface: str = "", **numbers: Any) -> ThesisClaim:
+        """The claim from all runs, with the spread of its number: "foam 7.2 kN/m (7 to 7.4, 10 seeds)"."""
+        held = sum(map(self.holds, results))
+        values = f"{surface} {spread(list(map(self.value, results)), self.unit)}".strip()
+        common = {"values": values, "surface": surface, "good": held, "runs": len(results)}
+        return claim(self.id, self.is_true(held, len(results)), **{**common, **self.numbers, **numbers})
 
 
 def count_verdicts(claims: Sequence[ThesisClaim]) -> dict[str, Counter[str]]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Group, Parameter, validators
 
 from palpate.cli.options.common import WRITTEN, FigureOptions
-from palpate.cli.toolkit import COMPILING, bar, console, place, print_lines, say, show_table
+from palpate.cli.toolkit import COMPILING, console, place, print_lines, progress_of_pieces, say, show_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,13 +19,8 @@ if TYPE_CHECKING:
     from palpate_thesis.measure import MeasurementFormat
     from palpate_thesis.runs import Runs
 
-COLORS = {
-    "reproduced": "green",
-    "reproduced in a plausible laboratory": "cyan",
-    "contradicted": "yellow",
-    "not checkable": "bright_black",
-}
-
+COLORS = ("green", "cyan", "yellow", "bright_black")
+"""Of the verdicts, in their order."""
 _MEASURED = Group("Measurement", sort_key=1)
 
 
@@ -100,26 +95,20 @@ def _measure(
     chosen: Sequence[FigureModule], folder: Path, runs: Runs, written: MeasurementFormat, replace: bool
 ) -> None:
     """Measure with a progress bar, and print the claims."""
-    from rich.progress import MofNCompleteColumn, TimeElapsedColumn
-
     from palpate.report.page import Table
-    from palpate_thesis.claims import count_in_words, texts
+    from palpate_thesis.claims import VERDICTS, count_in_words, texts
     from palpate_thesis.measure import measure
 
-    screen = console()
-    with bar(screen, MofNCompleteColumn(), TimeElapsedColumn()) as progress:
-        task = progress.add_task("", total=len(chosen))
-
-        def start_study(study: FigureModule) -> None:
-            description = f"{study.NUMBER}  {texts(study.NUMBER)[0]}"
-            progress.update(task, completed=chosen.index(study), description=description)
-
-        def say_resumed(done: int) -> None:
-            screen.print(f"resuming in {folder}: {done} of {len(chosen)} are measured already")
-
-        runs = changed(runs, waiting=partial(screen.print, COMPILING))
+    screen, total = console(), len(chosen)
+    with progress_of_pieces(console(stderr=True)) as progress:
         done = measure(
-            chosen, runs, folder, written=written, replace=replace, started=start_study, resumed=say_resumed
+            chosen,
+            changed(runs, waiting=partial(screen.print, COMPILING)),
+            folder,
+            written=written,
+            replace=replace,
+            started=lambda n: progress(f"{n.NUMBER}  {texts(n.NUMBER)[0]}", chosen.index(n), total),
+            resumed=lambda n: screen.print(f"resuming in {folder}: {n} of {total} are measured already"),
         )
     claims = [claim for study in done for claim in study.claims]
     rows = [(claim.id, claim.thesis, claim.measured, claim.verdict) for claim in claims]
@@ -128,7 +117,7 @@ def _measure(
     screen.print(written.about)
     if rows:
         table = Table("", ("claim", "thesis", "measured", "verdict"), rows)
-        show_table(screen, table, [COLORS[claim.verdict] for claim in claims])
+        show_table(screen, table, [COLORS[VERDICTS.index(claim.verdict)] for claim in claims])
     for study in done if len(done) == 1 else ():
         for beside in study.tables:
             show_table(screen, beside)

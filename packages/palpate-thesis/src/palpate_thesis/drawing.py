@@ -1,6 +1,6 @@
 """One look for all figures: sizes, colours and frames, and the panels that figures are made of."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -10,24 +10,12 @@ from palpate.records import Record
 from palpate.report import style
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib import axes, figure
+
+    Axes = axes.Axes
+    Figure = figure.Figure
 else:  # for annotations alone: matplotlib is imported when a figure is drawn
     Axes = Figure = Any
-
-__all__ = [
-    "LIMIT_LINE",
-    "STATED",
-    "ZERO",
-    "Axes",
-    "Figure",
-    "apply_look",
-    "force_figure",
-    "legend_inside",
-    "limits",
-    "panels",
-    "strip",
-]
 
 LIMIT_LINE: dict[str, Any] = {"color": style.INK, "linewidth": 1, "linestyle": "--"}
 STATED: dict[str, Any] = {"color": style.FAIL, "linewidth": 0.9, "linestyle": ":"}
@@ -39,10 +27,8 @@ LOOK: dict[str, Any] = {
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",
     "axes.labelcolor": style.QUIET,
-    "xtick.labelsize": 8.0,
-    "ytick.labelsize": 8.0,
-    "xtick.labelcolor": style.QUIET,
-    "ytick.labelcolor": style.QUIET,
+    **{f"{axis}tick.labelsize": 8.0 for axis in "xy"},
+    **{f"{axis}tick.labelcolor": style.QUIET for axis in "xy"},
     "legend.fontsize": 8.0,
     "legend.title_fontsize": 8.0,
     "legend.frameon": False,
@@ -83,16 +69,6 @@ def force_figure(shown: Record) -> Figure:
     return drawing
 
 
-def strip(axis: Axes, values: Mapping[str, Sequence[float]], label: str, limit: float | None = None) -> None:
-    """A dot a run for each variation, and the limit of a claim."""
-    for place, runs in enumerate(values.values()):
-        axis.plot([place] * len(runs), runs, "o", color=style.SERIES[0], markersize=4)
-    if limit is not None:
-        axis.axhline(limit, **LIMIT_LINE)
-    axis.set_xticks(range(len(values)), list(values))
-    axis.set(ylabel=label, ylim=(0.0, None))
-
-
 def limits(axis: Axes, shown: Record) -> None:
     """Shade the lower edge where a motor is at its limit."""
     limited = np.maximum.reduce([shown[f"saturated{i}"] for i in (1, 2, 3)]) > 0.0
@@ -100,8 +76,3 @@ def limits(axis: Axes, shown: Record) -> None:
         look: dict[str, Any] = {"color": style.FAIL, "linewidth": 0, "label": "a motor at its limit"}
         transform = axis.get_xaxis_transform()
         axis.fill_between(shown["t"], 0.0, 0.035, where=limited, transform=transform, **look)
-
-
-def legend_inside(axis: Axes, **options: object) -> None:
-    """The legend in a corner of the panel, where panels stand side by side."""
-    axis.legend(frameon=True, framealpha=0.85, edgecolor="none", **options)

@@ -9,6 +9,7 @@ from typing import Any, Protocol, cast
 from palpate.errors import unknown
 from palpate_thesis import explanations, figures
 from palpate_thesis.claims import ThesisClaim
+from palpate_thesis.claims import figures as texts_of_all
 from palpate_thesis.drawing import Figure
 from palpate_thesis.runs import Runs
 
@@ -17,8 +18,7 @@ class FigureModule(Protocol):
     """A module or object with one figure.
 
     ``NUMBER`` is the thesis' number of the figure ("6.11"), or our own name of an explanation
-    ("why-negative-mass"), by which claims.toml has its title and caption. It may have ``beside(data)``, a second
-    figure that the page folds away and whose docstring is its caption, and ``tables(data)``.
+    ("why-negative-mass"), by which claims.toml has its title and caption. It may have ``tables(data)``.
     """
 
     NUMBER: str
@@ -37,12 +37,9 @@ class FigureModule(Protocol):
 
 
 def studies() -> list[FigureModule]:
-    """All figures in the thesis' order, then all explanations."""
-
-    def number(figure: FigureModule) -> tuple[int, ...]:
-        return tuple(map(int, figure.NUMBER.split(".")))
-
-    return [*sorted(_studies_in(figures), key=number), *_studies_in(explanations)]
+    """All figures in the thesis' order, then all explanations: as in claims.toml."""
+    modules = [*_studies_in(figures), *_studies_in(explanations)]
+    return sorted(modules, key=lambda study: list(texts_of_all()).index(study.NUMBER))
 
 
 EXPERIMENTS = ("4.2", "4.4", "6.", "7.")

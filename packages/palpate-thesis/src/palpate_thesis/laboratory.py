@@ -31,24 +31,20 @@ FOAM_LIMIT = 15000.0
 
 @dataclass(frozen=True)
 class Unknown:
-    """A parameter that the thesis does not state.
+    """A parameter that the thesis does not state."""
 
-    Args:
-        name: field of `Laboratory`.
-        unit: of its values; "" for a number without one.
-        prior: distribution of its values: even, even in the logarithm, one of a few with equal probability, or a seed.
-        low, high: range; of a choice, the first and the last value.
-        reason: of the range.
-        choices: possible values, if they are a few.
-    """
+    name: str  # field of `Laboratory`
+    unit: str  # of its values; "" for a number without one
+    prior: Literal["even", "log-even", "one of", "any seed"]  # distribution of its values
+    low: float  # of its range; of a choice, the first value
+    high: float  # likewise; the last value
+    reason: str  # of the range
+    choices: tuple[float, ...] = ()  # possible values, if they are a few
 
-    name: str
-    unit: str
-    prior: Literal["even", "log-even", "one of", "any seed"]
-    low: float
-    high: float
-    reason: str
-    choices: tuple[float, ...] = ()
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Possible values of a choice or a seed."""
+        return self.choices or tuple(range(int(self.low), int(self.high) + 1))
 
     def quantile(self, fraction: float) -> float:
         """The value below which this fraction of the prior lies, 0 to 1."""
@@ -57,8 +53,7 @@ class Unknown:
             return min(max(value, self.low), self.high)  # rounding passes the ends
         if self.prior == "even":
             return (1.0 - fraction) * self.low + fraction * self.high
-        values = self.choices or tuple(range(int(self.low), int(self.high) + 1))
-        return float(values[min(int(fraction * len(values)), len(values) - 1)])
+        return float(self.values[min(int(fraction * len(self.values)), len(self.values) - 1)])
 
     def fraction(self, value: float) -> float:
         """Fraction of the prior below a value: the inverse of `quantile`, or the middle of the choice."""
@@ -66,8 +61,7 @@ class Unknown:
             return math.log(value / self.low) / math.log(self.high / self.low)
         if self.prior == "even":
             return (value - self.low) / (self.high - self.low)
-        values = self.choices or tuple(range(int(self.low), int(self.high) + 1))
-        return (values.index(value) + 0.5) / len(values)
+        return (self.values.index(value) + 0.5) / len(self.values)
 
     def check(self, value: Any, where: str) -> float:
         """Return a value as a number.
@@ -135,18 +129,13 @@ class Laboratory:
     arm_damping: float = 0.02
     restart: float = 5.0
 
-    @property
-    def is_bench(self) -> bool:
-        """True of the hand-chosen bench."""
-        return self == BENCH
-
     def numbers(self) -> dict[str, float]:
         """Finite values by name."""
         return {k: v for k, v in asdict(self).items() if v is not None and math.isfinite(v)}
 
     def adapt(self, experiment: Experiment) -> Experiment:
         """The experiment as this laboratory would have run it."""
-        if self.is_bench:
+        if self == BENCH:
             return experiment
         parts = (self._friction, self._place, self._sensor, self._identification)
         changes = {key: value for part in parts for key, value in part(experiment).items()}
@@ -181,11 +170,8 @@ class Laboratory:
             "wall.side_friction": e.wall.side_friction * self.sticking / BENCH.sticking,
         }
         if math.isfinite(self.arm_stiffness):
-            place["elastic"] = {
-                "stiffness": self.arm_stiffness,
-                "frequency": self.arm_frequency,
-                "damping": self.arm_damping,
-            }
+            mode = {"stiffness": self.arm_stiffness, "frequency": self.arm_frequency}
+            place["elastic"] = {**mode, "damping": self.arm_damping}
         return place
 
     def _sensor(self, e: Experiment) -> dict[str, Any]:
@@ -211,20 +197,17 @@ class Laboratory:
     def _surface(self, surface: KelvinVoigtSurface) -> dict[str, Any]:
         """The foam or the rubber of this laboratory, varied as `surface` is varied from the bench's."""
         name = "foam" if surface.stiffness < FOAM_LIMIT else "rubber"
-        linear: dict[str, Any] = {"kind": "kelvin-voigt"}
-        for key in ("stiffness", "damping", "mass"):
-            own, of_bench = (getattr(lab, f"{name}_{key}") for lab in (self, BENCH))
-            linear[key] = own * getattr(surface, key) / of_bench
+        stiffness, damping, mass = (
+            getattr(self, f"{name}_{key}") * getattr(surface, key) / getattr(BENCH, f"{name}_{key}")
+            for key in ("stiffness", "damping", "mass")
+        )
+        if name == "foam" and self.foam_law == STIFFENING:
+            return stiffening(stiffness, damping, mass, self.foam_exponent)
+        linear = {"kind": "kelvin-voigt", "stiffness": stiffness, "damping": damping, "mass": mass}
         if name == "rubber" or self.foam_law == LINEAR:
             return linear
-        if self.foam_law == STIFFENING:
-            return stiffening(linear["stiffness"], linear["damping"], linear["mass"], self.foam_exponent)
-        return {
-            **linear,
-            "kind": "standard-linear-solid",
-            "branch_stiffness": self.foam_branch * linear["stiffness"],
-            "branch_time": self.foam_branch_time,
-        }
+        branch = {"branch_stiffness": self.foam_branch * stiffness, "branch_time": self.foam_branch_time}
+        return {**linear, "kind": "standard-linear-solid", **branch}
 
 
 BENCH = Laboratory()
@@ -299,10 +282,7 @@ def laboratory_from(values: Mapping[str, Any], where: str, base: Laboratory) -> 
 def laboratory_text(laboratory: Laboratory, start: Laboratory, **head: str | Sequence[str]) -> str:
     """A laboratory as a TOML file that `load_laboratory` reads, with the values that are not those of its base.
 
-    Args:
-        laboratory: values.
-        start: the laboratory that the file names as `base`; the bench if it names none.
-        head: texts of the other keys.
+    The base is `start`, which `head` names in `base`, or the bench; `head` has the texts of all other keys.
     """
     values, others = laboratory.numbers(), start.numbers()
     changed = [f"{name} = {value!r}" for name, value in values.items() if value != others.get(name)]

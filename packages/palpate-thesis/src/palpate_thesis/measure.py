@@ -1,6 +1,5 @@
 """Measure the thesis study by study: each result is on disk at once, and an interrupted measurement resumes."""
 
-import inspect
 import time
 import tomllib
 from collections import Counter
@@ -16,7 +15,6 @@ import msgspec
 from palpate.errors import InputError
 from palpate.files import check_place, kept_folder, with_author, write_json, write_text
 from palpate.report import style
-from palpate.report.look.assets import text_of
 from palpate.report.page import data_address, render
 from palpate_thesis.claims import (
     VERDICTS,
@@ -33,27 +31,17 @@ from palpate_thesis.laboratory import BENCH, UNKNOWNS, Laboratory, load_laborato
 from palpate_thesis.runs import Runs, sources_digest
 
 STATE = "thesis.json"
-BESIDE = "-beside"
-"""End of the name of a folded figure's file."""
 
 
 @dataclass(frozen=True)
 class MeasurementFormat:
-    """How a measurement is written.
+    """How a measurement is written."""
 
-    Args:
-        command: command line that makes it again, for its page.
-        laboratory: its name, for the page.
-        endings: of the figures' files, besides the PNG that the page shows.
-        dpi: of a PNG; the usual one if None.
-        about: the laboratory of the experiments, in words.
-    """
-
-    command: str
-    laboratory: str = "bench"
-    endings: tuple[str, ...] = (".png",)
-    dpi: int | None = None
-    about: str = ""
+    command: str  # command line that makes it again, for its page
+    laboratory: str = "bench"  # its name, for the page
+    endings: tuple[str, ...] = (".png",)  # of the figures' files, besides the PNG that the page shows
+    dpi: int | None = None  # of a PNG; the usual one if None
+    about: str = ""  # the laboratory of the experiments, in words
 
 
 @dataclass
@@ -62,9 +50,7 @@ class FolderState:
 
     stamp: str
     wanted: list[str]
-    command: str
-    laboratory: str = ""
-    about: str = ""
+    written: MeasurementFormat
     values: dict[str, float] = field(default_factory=dict)
     done: dict[str, Done] = field(default_factory=dict)
 
@@ -107,19 +93,12 @@ def _measure_study(study: FigureModule, runs: Runs, folder: Path, written: Measu
     runs = runs_for(study.NUMBER, runs)
     data = study.run(runs)
     claims = [note_for(claim, runs.laboratory) for claim in study.check(data)]
-    beside, further = getattr(study, "beside", None), getattr(study, "tables", None)
+    further = getattr(study, "tables", None)
     with apply_look():
-        for name, draw in (("", study.plot), *([(BESIDE, beside)] if beside else [])):
-            for ending in dict.fromkeys((".png", *written.endings)):
-                style.save(draw(data), folder / f"{study.NUMBER}{name}{ending}", written.dpi)
-    return Done(
-        study.NUMBER,
-        *texts(study.NUMBER),
-        claims,
-        time.perf_counter() - start,
-        inspect.getdoc(beside) or "" if beside else "",
-        further(data) if further else [],
-    )
+        for ending in dict.fromkeys((".png", *written.endings)):
+            style.save(study.plot(data), folder / f"{study.NUMBER}{ending}", written.dpi)
+    seconds, tables = time.perf_counter() - start, further(data) if further else []
+    return Done(study.NUMBER, *texts(study.NUMBER), claims, seconds, tables)
 
 
 def runs_for(number: str, runs: Runs) -> Runs:
@@ -129,27 +108,25 @@ def runs_for(number: str, runs: Runs) -> Runs:
 
 def note_for(claim: ThesisClaim, laboratory: Laboratory) -> ThesisClaim:
     """Add the laboratory in which a sentence holds that does not hold here, and the unknowns that decide it."""
-    parts = [claim.note]
+    note = claim.note
     if claim.verdict == "reproduced in a plausible laboratory":
         elsewhere = plausible_laboratories()[claim.id]
-        parts.append(f"It holds with --laboratory {elsewhere}, which keeps the printed values too.")
+        note += f" It holds with --laboratory {elsewhere}, which keeps the printed values too."
     if claim.id in experiment_sentences() and laboratory == load_laboratory("inferred"):
-        deciding = [name for name, ids in sensitivity().items() if claim.id in ids]
-        names = ", ".join(deciding)
-        parts.append(
-            f"Unknowns that decide it, changed alone: {names}."
-            if deciding
-            else "No unknown, changed alone, decides it."
+        names = ", ".join(name for name, ids in sensitivity().items() if claim.id in ids)
+        note += (
+            f" Unknowns that decide it, changed alone: {names}."
+            if names
+            else " No unknown, changed alone, decides it."
         )
-    return replace(claim, note=" ".join(parts))
+    return replace(claim, note=note)
 
 
 @cache
 def sensitivity() -> Mapping[str, Sequence[str]]:
     """By unknown, the sentences whose truth it changes in the inferred laboratory: see `palpate laboratory`."""
     text = (resources.files("palpate_thesis") / "inference" / "sensitivity.toml").read_text("utf-8")
-    table: Mapping[str, Sequence[str]] = tomllib.loads(text)
-    return table
+    return tomllib.loads(text)
 
 
 def _load_state(
@@ -157,13 +134,11 @@ def _load_state(
 ) -> FolderState:
     wanted = [study.NUMBER for study in studies]
     stamp = f"{sources_digest()} seeds {list(runs.seeds)}"
-    if not runs.laboratory.is_bench:
+    if runs.laboratory != BENCH:
         stamp += f" laboratory {runs.laboratory.numbers()}"
     path = folder / STATE
     if not path.exists():
-        return FolderState(
-            stamp, wanted, written.command, written.laboratory, written.about, runs.laboratory.numbers()
-        )
+        return FolderState(stamp, wanted, written, runs.laboratory.numbers())
     check_place(path)
     try:
         state = msgspec.json.decode(path.read_bytes(), type=FolderState)
@@ -184,56 +159,52 @@ def _write_results(state: FolderState, folder: Path) -> None:
     """Write claims.json, the page and the state, each file whole or as it was."""
     done = [state.done[number] for number in state.wanted if number in state.done]
     write_json(folder / "claims.json", [asdict(claim) for study in done for claim in study.claims])
-    names = [f"{study.number}{end}" for study in done for end in ("", BESIDE if study.beside else "")]
-    pictures = {name: data_address((folder / f"{name}.png").read_bytes(), "image/png") for name in names}
+    pictures = {
+        study.number: data_address((folder / f"{study.number}.png").read_bytes(), "image/png")
+        for study in done
+    }
     missing = [number for number in state.wanted if number not in state.done]
     write_text(folder / "index.html", index_page(done, pictures, missing, state))
     _save_state(state, folder)
 
 
 TONES = dict(zip(VERDICTS, ("ok", "part", "warn", "none"), strict=True))
-_CHAPTERS = {"3": "The bench", "4": "The controllers", "5": "The identifiers", "7": "Conclusions"}
-_EXPLANATIONS = "Explanations"
-_SECTIONS_OF_CHAPTER_6 = {5: "Least squares", 9: "Neural identifier", 17: "Force control"}
-"""By the number of the last figure in each."""
+CHAPTERS = {
+    (3, 0): "The bench",
+    (4, 0): "The controllers",
+    (5, 0): "The identifiers",
+    (6, 0): "Least squares",
+    (6, 6): "Neural identifier",
+    (6, 10): "Force control",
+    (7, 0): "Conclusions",
+}
+"""Chapters of the page, by the place in the thesis where each begins."""
 
 
 def index_page(
     done: Sequence[Done], pictures: Mapping[str, str], missing: Sequence[str], state: FolderState
 ) -> str:
-    """The page as HTML, figures included; it opens without a network.
-
-    Args:
-        done: measured studies.
-        pictures: source of each image, by the name of its file.
-        missing: numbers of the studies still to come.
-        state: of the folder.
-    """
+    """The page as HTML, with the measured studies and their pictures by number; it opens without a network."""
     claims = [claim for study in done for claim in study.claims]
     verdicts = Counter(claim.verdict for claim in claims)
-    chapters: dict[str, list[dict[str, Any]]] = {}
-    for study in done:
-        row = {"study": study, "claims": study.claims}
-        chapters.setdefault(chapter_of(study.number), []).append(row)
+    titles = dict.fromkeys(chapter_of(study.number) for study in done)
     return render(
         "index.html",
         "palpate_thesis",
         room="thesis",
         title="The thesis, measured again",
-        chapters=[{"title": title, "studies": studies} for title, studies in chapters.items()],
+        chapters={title: [s for s in done if chapter_of(s.number) == title] for title in titles},
         count=verdicts.total(),
         counts=count_in_words(claims),
-        about=state.about,
+        about=state.written.about,
         verdicts=verdicts,
         tones=TONES,
         pictures=pictures,
         missing=missing,
-        command=state.command,
-        laboratory=state.laboratory,
+        command=state.written.command,
+        laboratory=state.written.laboratory,
         unknowns=_unknowns_table(state),
-        besides=BESIDE,
         seconds=sum(study.seconds for study in done),
-        scripts=(text_of("index.js", "palpate_thesis"),),
     )
 
 
@@ -249,10 +220,7 @@ def _unknowns_table(state: FolderState) -> list[dict[str, Any]]:
 
 def chapter_of(number: str) -> str:
     """Title of the page's chapter for the thesis' number of a figure, or for the name of an explanation."""
-    chapter, _, figure = number.partition(".")
-    if not figure.isdigit():
-        return _EXPLANATIONS
-    if chapter == "6":
-        last = min(last for last in _SECTIONS_OF_CHAPTER_6 if int(figure) <= last)
-        return _SECTIONS_OF_CHAPTER_6[last]
-    return _CHAPTERS[chapter]
+    if not number[0].isdigit():
+        return "Explanations"
+    place = tuple(map(int, number.split(".")))
+    return next(title for start, title in reversed(CHAPTERS.items()) if start <= place)

@@ -4,6 +4,7 @@ import operator
 from collections.abc import Callable, Mapping
 from functools import cache
 from importlib import resources
+from itertools import product
 from typing import Any, Literal
 
 import msgspec
@@ -11,38 +12,31 @@ import msgspec
 from palpate.bench import Experiment, load
 from palpate.identifiers.neural_probe import SETTINGS
 from palpate.robots.arm3 import Arm3
-from palpate_thesis.figures import fig_6_10, fig_6_11_17, fig_6_15
+from palpate_thesis.figures import fig_6_10_17 as force
 from palpate_thesis.laboratory import Laboratory
 from palpate_thesis.neural_identifier.network import identifier_network
 
 EXPERIMENTS: Mapping[str, Experiment] = {
     "press on foam": load("foam-rls"),
     "press on rubber": load("rubber-rls"),
-    "steps on foam": fig_6_11_17.FOAM.PARAMETERS,
-    "sine on foam": fig_6_11_17.SINE.PARAMETERS,
-    "small rate": fig_6_11_17.SLOW.PARAMETERS,
-    "steps on rubber": fig_6_11_17.RUBBER.PARAMETERS,
-    "sine on rubber": fig_6_11_17.RUBBER_SINE.PARAMETERS,
-    "hybrid alone": fig_6_10.PARAMETERS,
-    "free directions": fig_6_15.PARAMETERS,
+    "steps on foam": force.ON_FOAM,
+    "sine on foam": force.ON_FOAM_SINE,
+    "small rate": force.SLOW_FOAM,
+    "steps on rubber": force.ON_RUBBER,
+    "sine on rubber": force.ON_RUBBER_SINE,
+    "hybrid alone": force.HYBRID_ALONE.PARAMETERS,
+    "free directions": force.FreeDirections.PARAMETERS,
 }
 """Experiments of chapter 6. Those of force control start nearer to the surface, see `runs.SHORT`."""
 
 
 class PrintedFact(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A printed number.
+    """A number that the thesis prints."""
 
-    Args:
-        path: of the attribute that has the value, "robot.torque_limits".
-        printed: number, list of them, or word; "none" for the absence of a value.
-        where: place in the thesis, and what contradicts it there.
-        rule: relation of a laboratory's value to the printed one.
-    """
-
-    path: str
-    printed: Any
-    where: str
-    rule: Literal["equal", "at most", "above"] = "equal"
+    path: str  # of the attribute that has the value, "robot.torque_limits"
+    printed: Any  # number, list of them, or word; "none" for the absence of a value
+    where: str  # place in the thesis, and what contradicts it there
+    rule: Literal["equal", "at most", "above"] = "equal"  # of a laboratory's value to it
 
     def allows(self, value: Any) -> bool:
         """True if a value agrees with the printed one."""
@@ -60,18 +54,12 @@ RULES: Mapping[str, Callable[[Any, Any], bool]] = {
 }
 
 
-class FactGroup(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Printed numbers of the same things; "each" stands for every experiment."""
-
-    of: tuple[str, ...]
-    facts: tuple[PrintedFact, ...]
-
-
 @cache
-def printed_facts() -> tuple[FactGroup, ...]:
-    """All groups of printed.toml."""
+def printed_facts() -> Mapping[str, tuple[PrintedFact, ...]]:
+    """Facts of printed.toml, by the names of what they are of; "each" stands for every experiment."""
     text = resources.files("palpate_thesis").joinpath("printed.toml").read_text("utf-8")
-    return tuple(msgspec.toml.decode(text, type=dict[str, FactGroup]).values())
+    groups = msgspec.toml.decode(text, type=dict[str, tuple[PrintedFact, ...]])
+    return {", ".join(EXPERIMENTS) if of == "each" else of: facts for of, facts in groups.items()}
 
 
 def subjects(laboratory: Laboratory) -> dict[str, Any]:
@@ -88,17 +76,16 @@ def contradictions(laboratory: Laboratory) -> list[str]:
     """Values of a laboratory that contradict a printed number, each in a line."""
     by_name = subjects(laboratory)
     lines = []
-    for group in printed_facts():
-        for name in EXPERIMENTS if group.of == ("each",) else group.of:
-            for fact in group.facts:
-                value = operator.attrgetter(fact.path)(by_name[name])
-                if not fact.allows(value):
-                    lines.append(f"{name}: {fact.path} is {value}, printed {fact.printed} ({fact.where})")
+    for of, facts in printed_facts().items():
+        for name, fact in product(of.split(", "), facts):
+            value = operator.attrgetter(fact.path)(by_name[name])
+            if not fact.allows(value):
+                lines.append(f"{name}: {fact.path} is {value}, printed {fact.printed} ({fact.where})")
     return lines
 
 
 def count_contradictions(laboratory: Laboratory) -> str:
     """Sentence on how many printed numbers a laboratory contradicts."""
-    count, lines = sum(len(group.facts) for group in printed_facts()), contradictions(laboratory)
+    count, lines = sum(map(len, printed_facts().values())), contradictions(laboratory)
     named = f": {lines[0]}" if lines else ""
     return f"Contradicts {len(lines) or 'none'} of the {count} printed numbers{named}."

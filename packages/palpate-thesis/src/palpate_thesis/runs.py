@@ -2,7 +2,7 @@
 
 import hashlib
 import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +17,6 @@ from palpate_thesis.laboratory import BENCH, Laboratory
 
 K = TypeVar("K")
 T = TypeVar("T")
-W = TypeVar("W")
 
 VARIED_SEEDS = 3
 """Runs of each variation; the nominal case is run with all seeds."""
@@ -33,17 +32,11 @@ def sources_digest() -> str:
 
 @dataclass(frozen=True)
 class Runs:
-    """Run experiments on the bench; compiled loops release the interpreter, so threads fill the cores.
+    """Run experiments on the bench; compiled loops release the interpreter, so threads fill the cores."""
 
-    Args:
-        seeds: of the noise; every claim is measured over all of them.
-        waiting: called when a loop has to be compiled first.
-        laboratory: in which every experiment is run.
-    """
-
-    seeds: Sequence[int] = tuple(range(10))
-    waiting: Callable[[], None] | None = None
-    laboratory: Laboratory = BENCH
+    seeds: Sequence[int] = tuple(range(10))  # of the noise; every claim is measured over all of them
+    waiting: Callable[[], None] | None = None  # called when a loop has to be compiled first
+    laboratory: Laboratory = BENCH  # in which every experiment is run
     _stopped: threading.Event = field(default_factory=threading.Event, compare=False, repr=False)
 
     def record(self, experiment: Experiment, seed: int | None = None) -> Record:
@@ -59,15 +52,7 @@ class Runs:
 
     def over_seeds(self, experiment: Experiment, measure: Callable[[Record], T]) -> list[T]:
         """`measure` of each seed's record; the records (some 12 MB each) are not stored."""
-        return self.over([(experiment, seed) for seed in self.seeds], measure)
-
-    def over(self, cases: Iterable[tuple[Experiment, int]], measure: Callable[[Record], T]) -> list[T]:
-        """`measure` of the record of each case, an experiment and a seed, in their order."""
-
-        def work(case: tuple[Experiment, int]) -> T:
-            return measure(self.record(*case))
-
-        return self.map(work, list(cases))
+        return self.by_name({"": experiment}, measure)[""]
 
     def by_name(
         self, experiments: Mapping[K, Experiment], measure: Callable[[Record], T], seeds: int | None = None
@@ -109,21 +94,6 @@ RELAXING_FOAM = {
         "branch_time": 0.23,
     }
 }
-NEAREST_WALL = 0.457
-"""x of the nearest wall that the listed approach allows: it starts at 0.454 m and steps from 0.456 m outwards [m]."""
-
-
-def move_wall(experiment: Experiment, x: float) -> Mapping[str, Any]:
-    """Changes that bring start, approach and wall together to a wall at x [m]."""
-    offset = x - experiment.wall.x
-    start = experiment.robot.start
-    return {
-        "wall.x": x,
-        "robot.start": (start[0] + offset, *start[1:]),
-        "approach.first": experiment.approach.first + offset,
-    }
-
-
 LUGRE = ("coulomb", "static", "bristle_stiffness", "bristle_damping")
 
 
@@ -131,13 +101,3 @@ def rougher(experiment: Experiment, factor: float, *names: str) -> Mapping[str, 
     """Changes that multiply parameters of the joints' friction: those of these names, or all."""
     f = experiment.friction
     return {f"friction.{n}": tuple(factor * v for v in getattr(f, n)) for n in names or LUGRE}
-
-
-def friction_and_pose(experiment: Experiment) -> dict[str, Mapping[str, Any]]:
-    """Variations of every force-control figure: half and double friction, the wall nearer and farther."""
-    return {
-        "friction\nhalf": rougher(experiment, 0.5),
-        "friction\ndouble": rougher(experiment, 2.0),
-        "wall at\n0.457 m": move_wall(experiment, NEAREST_WALL),
-        "wall at\n0.49 m": move_wall(experiment, 0.49),
-    }

@@ -28,6 +28,8 @@ CAUSES = {
 """Signal faults between the surface and the thesis' estimator, in the order of the waterfall."""
 BEFORE, PRESS = 1.5, 4.0
 TICK = 1e-3
+FORCE_CUTOFF, MOTION_CUTOFF, SAMPLING = 120.0, 35.0, 480.0
+"""Of the force sensor and the force's filter, of the acceleration's, and of the sensor [Hz]."""
 START, COVARIANCE = (0.0, 0.0, 2e5), 1e10
 
 
@@ -41,8 +43,6 @@ class RegressionWindow(NamedTuple):
     x0: float  # measured x at the change-over [m]
     wall: float  # [m]
     first: int  # sample of the change-over
-    sensor: tuple[float, float]  # cut-off and sampling of the force sensor [Hz]
-    cutoffs: tuple[float, float]  # of force and acceleration [Hz]
     matched: Array  # M, B, K of the matched front-end at the end of the window
 
 
@@ -62,8 +62,6 @@ def window(record: Record) -> RegressionWindow:
         x0=float(record["x_measured"][at]),
         wall=float(e["wall"]["x"]),
         first=first,
-        sensor=(float(e["force_sensor"]["cutoff"]), float(e["force_sensor"]["sampling"])),
-        cutoffs=(float(e["filters"]["force"]), float(e["filters"]["motion"])),
         matched=np.array([record[f"{key}_matched"][rows][-1] for key in "MBK"]),
     )
 
@@ -89,22 +87,22 @@ def _motion(press: RegressionWindow, causes: Collection[str]) -> tuple[Array, Ar
         v = np.gradient(position, TICK)
         a = np.gradient(v, TICK)
     if "acceleration" in causes:
-        a = filter_signal(butterworth2(press.cutoffs[1], 1.0 / TICK), a)
+        a = filter_signal(butterworth2(MOTION_CUTOFF, 1.0 / TICK), a)
     return position - (press.x0 if "offset" in causes else press.wall), v, a
 
 
 def _force(press: RegressionWindow, causes: Collection[str]) -> Array:
-    sensed = through_sensor(press.force, *press.sensor)
+    sensed = through_sensor(press.force)
     force = sensed if "lag" in causes else press.force
     if "noise" in causes:
         force = force + (press.sampled - sensed)
-    return filter_signal(butterworth2(press.cutoffs[0], 1.0 / TICK), force) if "filter" in causes else force
+    return filter_signal(butterworth2(FORCE_CUTOFF, 1.0 / TICK), force) if "filter" in causes else force
 
 
-def through_sensor(force: Array, cutoff: float = 120.0, sampling: float = 480.0) -> Array:
+def through_sensor(force: Array) -> Array:
     """The force as the sensor gives it without noise: its filter, one cycle of computing, half a cycle of holding."""
-    analog = butterworth3(cutoff, 1.0 / TICK)
-    return late(filter_signal(analog.second, filter_signal(analog.first, force)), 1.5 / sampling)
+    analog = butterworth3(FORCE_CUTOFF, 1.0 / TICK)
+    return late(filter_signal(analog.second, filter_signal(analog.first, force)), 1.5 / SAMPLING)
 
 
 def filter_signal(section: Biquad, signal: Array) -> Array:
@@ -121,9 +119,9 @@ def late(signal: Array, seconds: float) -> Array:
     return signal if seconds == 0.0 else np.interp(k - seconds / TICK, k, signal)
 
 
-def delayed_fit(M: float, B: float, K: float, lag: float) -> tuple[float, float]:
+def delayed_fit(M: float, B: float, K: float, lag: float | Array) -> Array:
     """M and B estimated from a force that lags by `lag`, to second order: x(t - T) = x - T v + T^2/2 a."""
-    return M - B * lag + K * lag**2 / 2.0, B - K * lag
+    return np.array([M - B * lag + K * lag**2 / 2.0, B - K * lag])
 
 
 NUMBER = "why-negative-mass"
@@ -170,8 +168,7 @@ def run(runs: Runs) -> Data:
 
 
 def _press(record: Record) -> EstimatesOfPress:
-    press = window(record)
-    names = list(CAUSES)
+    press, names = window(record), list(CAUSES)
     return EstimatesOfPress(
         steps=np.array([estimate(press, names[:i]) for i in range(len(names) + 1)]),
         lags=np.array([estimate(press, (), lag) for lag in LAGS]),
@@ -186,42 +183,31 @@ def check(data: Data) -> Sequence[ThesisClaim]:
     relaxing = perfect["relaxing foam"]
     right = all(abs(float(np.median(perfect[s])) - data.truth[s][0]) < 0.05 for s in MODELLED)
     masses = "; ".join(f"{s} {spread(perfect[s], 'kg', 2)}, true {data.truth[s][0]:g} kg" for s in MODELLED)
-    parts, worst = [], 0.0
-    for surface in MODELLED:
-        M, B, K = data.truth[surface]
-        predicted = np.array(delayed_fit(M, B, K, SENSOR_LAG))
-        fitted = data.middle(surface, "sensor")[:2]
-        apart = np.abs(fitted - predicted) / np.abs(predicted - np.array([M, B]))
-        worst = max(worst, float(apart.max()))
-        parts.append(
-            f"{surface}: M {fitted[0]:.2f} ({predicted[0]:.2f}) kg, B {fitted[1]:.0f} ({predicted[1]:.0f}) N s/m"
-        )
+    foam, rubber = (_contributions(data.middle(surface, "steps")[:, 0]) for surface in MODELLED)
+    shifts = {surface: _shift_by_lag(data, surface) for surface in MODELLED}
+    near = all(apart < NEAR_FORMULA for _, apart in shifts.values())
+    values = "; ".join(f"{surface}: {words}" for surface, (words, _) in shifts.items())
     return [
-        claim(
-            "negative-mass.small",
-            not right,
-            masses=masses,
-            foam_added=_contributions(data, "plain foam"),
-            rubber_added=_contributions(data, "rubber"),
-        ),
-        claim(
-            "negative-mass.lag",
-            worst < NEAR_FORMULA,
-            sensor_lag=1e3 * SENSOR_LAG,
-            surfaces="; ".join(parts),
-        ),
-        claim("negative-mass.model", max(relaxing) < 0.0, masses=relaxing),
+        claim("negative-mass.small", not right, masses=masses, foam_added=foam, rubber_added=rubber),
+        claim("negative-mass.lag", near, sensor_lag=1e3 * SENSOR_LAG, values=values),
+        claim("negative-mass.model", max(relaxing) < 0.0, values=spread(relaxing, "kg")),
         _matched_claim(data),
     ]
 
 
-def _contributions(data: Data, surface: str) -> str:
+def _contributions(masses: Array) -> str:
     """Sentence with the contribution of each cause."""
-    steps = data.middle(surface, "steps")[:, 0]
-    added = zip(CAUSES.values(), np.diff(steps), strict=True)
-    return (
-        f"{steps[0]:.2f} kg, then {', '.join(f'{n} {s:+.2f}' for n, s in added)}, in all {steps[-1]:.2f} kg"
-    )
+    added = (f"{n} {s:+.2f}" for n, s in zip(CAUSES.values(), np.diff(masses), strict=True))
+    return f"{masses[0]:.2f} kg, then {', '.join(added)}, in all {masses[-1]:.2f} kg"
+
+
+def _shift_by_lag(data: Data, surface: str) -> tuple[str, float]:
+    """M and B with the sensor's lag, fitted and by the formula, and how far the shift is from it."""
+    predicted = delayed_fit(*data.truth[surface], SENSOR_LAG)
+    fitted = data.middle(surface, "sensor")[:2]
+    apart = np.abs(fitted - predicted) / np.abs(predicted - np.array(data.truth[surface][:2]))
+    words = f"M {fitted[0]:.2f} ({predicted[0]:.2f}) kg, B {fitted[1]:.0f} ({predicted[1]:.0f}) N s/m"
+    return words, float(apart.max())
 
 
 def _matched_claim(data: Data) -> ThesisClaim:
@@ -229,15 +215,14 @@ def _matched_claim(data: Data) -> ThesisClaim:
     for surface in MODELLED:
         truth = dict(zip("MBK", data.truth[surface], strict=True))
         matched = dict(zip("MBK", np.transpose([p.matched for p in data.presses[surface]]), strict=True))
-        middle = {key: float(np.median(matched[key])) for key in "MBK"}
-        good &= all(abs(middle[key] / truth[key] - 1.0) < NEAR_TRUTH[key] for key in "BK")
-        good &= abs(middle["M"] - truth["M"]) < NEAR_TRUTH["M"]
+        limits = {"K": NEAR_TRUTH["K"] * truth["K"], "B": NEAR_TRUTH["B"] * truth["B"], "M": NEAR_TRUTH["M"]}
+        good &= all(abs(np.median(matched[key]) - truth[key]) < limit for key, limit in limits.items())
         parts.append(
             f"{surface}: K {spread(1e-3 * matched['K'], 'kN/m')}, true {1e-3 * truth['K']:g}; "
             f"B {spread(matched['B'], 'N s/m')}, true {truth['B']:g}; "
             f"M {spread(matched['M'], 'kg', 2)}, true {truth['M']:g}"
         )
-    return claim("negative-mass.matched", bool(good), surfaces="; ".join(parts))
+    return claim("negative-mass.matched", bool(good), values="; ".join(parts))
 
 
 def plot(data: Data) -> Figure:
@@ -246,42 +231,39 @@ def plot(data: Data) -> Figure:
     for axis, letter, (surface, index) in zip(axes, "abcdef", product(PARAMETERS, (0, 1)), strict=False):
         panels.set_title(axis, letter, f"{LABELS[index].split(' ')[0]} on {surface}")
         _waterfall(axis, data, surface, index)
-        axis.set_xlabel(LABELS[index])
-        if index:
-            axis.set_yticklabels([])
     for index, axis in enumerate(axes[6:8]):
+        panels.set_title(
+            axis, "gh"[index], f"{LABELS[index].split(' ')[0]} of perfect signals, the force late by T"
+        )
         _lag_panel(axis, data, index)
     return drawing
 
 
 def _waterfall(axis: Axes, data: Data, surface: str, index: int) -> None:
-    steps = data.middle(surface, "steps")[:, index]
+    """A bar from each estimate to the one with a cause more; last, the matched channels."""
     seeds = np.array([[*p.steps[:, index], p.matched[index]] for p in data.presses[surface]])
-    labels = ["perfect signals", *(f"+ {name}" for name in CAUSES.values()), "channels matched"]
-    for i, value in enumerate((*steps, np.median(seeds[:, -1]))):
-        before = steps[i - 1] if 0 < i < len(steps) else 0.0
-        color = style.FAIL if value < before else style.SERIES[0]
-        color = {0: style.MEASURED, len(steps): style.OK}.get(i, color)
-        axis.barh(i, value - before, left=before, color=color, height=0.62)
-        axis.plot(seeds[:, i], np.full(len(seeds), i), "o", color=style.INK, markersize=1.8, alpha=0.5)
-        if 0 < i < len(steps):
-            axis.plot([before, before], [i - 1, i], color=style.MEASURED, linewidth=0.8)
+    middle = np.median(seeds, axis=0)
+    before = np.array([0.0, *middle[:-2], 0.0])
+    rows, added = np.arange(len(middle)), middle - before
+    colors = [style.FAIL if value < 0.0 else style.SERIES[0] for value in added]
+    axis.barh(rows, added, left=before, color=[style.MEASURED, *colors[1:-1], style.OK], height=0.62)
+    axis.plot(seeds.T, rows, "o", color=style.INK, markersize=1.8, alpha=0.5)
     axis.axvline(0.0, **ZERO)
-    if surface != "relaxing foam":
+    if surface in MODELLED:
         axis.axvline(data.truth[surface][index], color=style.OK, linewidth=1.1, linestyle="--")
-    axis.set_yticks(range(len(labels)), labels)
+    labels = ["perfect signals", *(f"+ {name}" for name in CAUSES.values()), "channels matched"]
+    axis.set_yticks(rows, labels if index == 0 else [""] * len(rows))
     axis.invert_yaxis()
+    axis.set_xlabel(LABELS[index])
 
 
 def _lag_panel(axis: Axes, data: Data, index: int) -> None:
-    name = LABELS[index].split(" ")[0]
-    panels.set_title(axis, "gh"[index], f"{name} of perfect signals, the force late by T")
     fine = np.linspace(0.0, float(LAGS[-1]), 100)
     for surface in MODELLED:
         color = panels.COLORS[surface.removeprefix("plain ")]
         fits = data.middle(surface, "lags")[:, index]
         axis.plot(1e3 * LAGS, fits, "o", color=color, markersize=4, label=surface)
-        predicted = [delayed_fit(*data.truth[surface], lag)[index] for lag in fine]
+        predicted = delayed_fit(*data.truth[surface], fine)[index]
         axis.plot(1e3 * fine, predicted, "--", color=color, linewidth=1.1)
     axis.axhline(0.0, **ZERO)
     axis.set(xlabel="T [ms]", ylabel=LABELS[index])

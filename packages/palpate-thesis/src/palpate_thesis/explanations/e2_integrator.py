@@ -11,15 +11,7 @@ from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, spread
 from palpate_thesis.drawing import Axes, Figure, limits, panels
-from palpate_thesis.force_control.tracking import (
-    FOAM,
-    RUBBER,
-    SINE,
-    Tracking,
-    since_contact,
-    slot,
-    tracking,
-)
+from palpate_thesis.force_control.tracking import FOAM, RUBBER, SINE, since_contact, slot, tracking
 from palpate_thesis.runs import Runs
 
 NUMBER = "neural-is-an-integrator"
@@ -30,62 +22,55 @@ RATES = (1e-6, 5e-6, 1e-5, 5e-5, 1e-4, 2e-4, 5e-4)
 GAINS = np.array(RATES) * (AMPLITUDE / 2) ** 2 / TICK
 """That of each learning rate tried [1/s]."""
 PI: Mapping[str, Any] = {"controller": {"kind": "proportional-integral", "kf": 0.25, "ki": GAIN}}
-LONG = {"run.press": 15.0}
-PARAMETERS: Mapping[str, Experiment] = {
-    "foam, steps": with_values(FOAM, LONG),
-    "foam, steps and sine": with_values(FOAM, {**LONG, **SINE}),
-    "rubber, steps": with_values(RUBBER, LONG),
-    "rubber, steps and sine": with_values(RUBBER, {**LONG, **SINE}),
-}
 JUDGED = (10.0, 15.0)
 SHARE = 0.10
 """Within which gains and RMS errors have to agree."""
 FITTED = 5.0
 """Seconds after contact over which the gain is measured [s]."""
-
-
-class BothControllers(NamedTuple):
-    """An experiment under both controllers."""
-
-    network: Record
-    pi: Record
-    network_runs: list[Tracking]
-    pi_runs: list[Tracking]
+PARAMETERS: Mapping[str, Experiment] = {
+    f"{surface}, {force}": with_values(experiment, {"run.press": JUDGED[1], **changes})
+    for surface, experiment in (("foam", FOAM), ("rubber", RUBBER))
+    for force, changes in (("steps", {}), ("steps and sine", SINE))
+}
 
 
 class Data(NamedTuple):
-    """Measured values for `check` and `plot`."""
+    """Measured values for `check` and `plot`; pairs are of the network and of the PI."""
 
-    pairs: dict[str, BothControllers]
+    shown: dict[str, list[Record]]  # a pair for each experiment
+    errors: dict[str, list[list[float]]]  # a pair of RMS errors over the seeds [N]
     gains: dict[str, Array]  # by surface: (rates, seeds) [1/s]
+
+    def medians(self, name: str) -> tuple[float, float]:
+        """Median RMS error of the network and of the PI in an experiment [N]."""
+        network, plain = (float(np.median(errors)) for errors in self.errors[name])
+        return network, plain
 
 
 def run(runs: Runs) -> Data:
     """Both controllers on all four experiments, and the network's gain over its learning rate."""
-    pairs = {name: _pair(runs, e) for name, e in PARAMETERS.items()}
-    gains = {name: _gains(runs, e) for name, e in (("foam", FOAM), ("rubber", RUBBER))}
-    return Data(pairs, gains)
+    measure = tracking(*JUDGED)
+    pairs = {name: [e, with_values(e, PI)] for name, e in PARAMETERS.items()}
+    shown = {name: [slot(runs.record(e), *JUDGED) for e in pair] for name, pair in pairs.items()}
+    errors = {
+        name: [[run.rms for run in runs.over_seeds(e, measure)] for e in pair] for name, pair in pairs.items()
+    }
+    return Data(shown, errors, {"foam": _gains(runs, FOAM), "rubber": _gains(runs, RUBBER)})
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """Gains and errors have to agree within a tenth."""
-    at = RATES.index(RATE)
-    small = [i for i, rate in enumerate(RATES) if rate <= 1e-4]
+    at, small = RATES.index(RATE), np.array(RATES) <= 1e-4
     worst = max(np.abs(g / GAINS[:, None] - 1.0)[small].max() for g in data.gains.values())
-    table = "; ".join(
-        f"{name} {_median(p.network_runs):.2f} and {_median(p.pi_runs):.2f} N"
-        for name, p in data.pairs.items()
-    )
-    seeds = len(next(iter(data.pairs.values())).pi_runs)
-    apart = max(abs(_median(p.network_runs) / _median(p.pi_runs) - 1.0) for p in data.pairs.values())
+    medians = {name: data.medians(name) for name in data.errors}
+    apart = max(abs(network / plain - 1.0) for network, plain in medians.values())
+    gains = (f"{name} {spread(list(g[at]), 'per second')}" for name, g in data.gains.items())
     return [
         claim(
             "neural-integrator.gain",
-            worst <= SHARE,
+            bool(worst <= SHARE),
             gain=GAIN,
-            surfaces="; ".join(
-                (f"{name} {spread(list(g[at]), 'per second')}" for name, g in data.gains.items())
-            ),
+            values="; ".join(gains),
             worst=worst,
             fitted=FITTED,
             share=SHARE,
@@ -93,9 +78,9 @@ def check(data: Data) -> Sequence[ThesisClaim]:
         claim(
             "neural-integrator.errors",
             apart <= SHARE,
-            cases=table,
+            cases="; ".join(f"{name} {a:.2f} and {b:.2f} N" for name, (a, b) in medians.items()),
             apart=apart,
-            seeds=seeds,
+            seeds=data.gains["foam"].shape[1],
             share=SHARE,
         ),
     ]
@@ -104,24 +89,18 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 def plot(data: Data) -> Figure:
     """Four overlays, and the gain over the rate."""
     drawing, grid = panels([1.9, 1.9, 2.5], columns=2, width=11.0)
-    for axis, (name, pair) in zip([*grid[0], *grid[1]], data.pairs.items(), strict=True):
-        _overlay(axis, name, pair)
+    for axis, (name, (network, plain)) in zip([*grid[0], *grid[1]], data.shown.items(), strict=True):
+        color = style.SERIES[1]
+        axis.plot(network["t"], network["force"], color=color, linewidth=3.2, alpha=0.5, label="network")
+        axis.plot(plain["t"], plain["force"], color=style.SERIES[0], linewidth=1.0, label="PI")
+        axis.plot(plain["t"], plain["force_desired"], **style.KNOWN, label="desired")
+        limits(axis, network)
+        axis.set_title("{}: {:.2f} and {:.2f} N".format(name, *data.medians(name)))
+        axis.set(ylabel="force [N]", xlim=JUDGED)
     style.legend(grid[0][0])
-    for axis in grid[1]:
-        axis.set_xlabel("time since contact [s]")
     for axis, (name, measured) in zip(grid[2], data.gains.items(), strict=True):
         _gain_panel(axis, name, measured)
     return drawing
-
-
-def _overlay(axis: Axes, name: str, pair: BothControllers) -> None:
-    wide: Any = {"color": style.SERIES[1], "linewidth": 3.2, "alpha": 0.5, "label": "network"}
-    axis.plot(pair.network["t"], pair.network["force"], **wide)
-    axis.plot(pair.pi["t"], pair.pi["force"], color=style.SERIES[0], linewidth=1.0, label="PI")
-    axis.plot(pair.pi["t"], pair.pi["force_desired"], **style.KNOWN, label="desired")
-    limits(axis, pair.network)
-    axis.set_title(f"{name}: {_median(pair.network_runs):.2f} and {_median(pair.pi_runs):.2f} N")
-    axis.set(ylabel="force [N]", xlim=JUDGED)
 
 
 def _gain_panel(axis: Axes, name: str, measured: Array) -> None:
@@ -132,14 +111,6 @@ def _gain_panel(axis: Axes, name: str, measured: Array) -> None:
     axis.axvline(1e-4, color=style.MEASURED, linewidth=1, linestyle=":", label="the listing's")
     axis.set(xscale="log", yscale="log", xlabel="learning rate eta", ylabel="K_i [1/s]")
     style.legend(axis, ncols=2)
-
-
-def _pair(runs: Runs, experiment: Experiment) -> BothControllers:
-    measure = tracking(*JUDGED)
-    plain = with_values(experiment, PI)
-    network_runs, pi_runs = runs.over_seeds(experiment, measure), runs.over_seeds(plain, measure)
-    network_shown, pi_shown = (slot(runs.record(e), *JUDGED) for e in (experiment, plain))
-    return BothControllers(network_shown, pi_shown, network_runs, pi_runs)
 
 
 def _gains(runs: Runs, experiment: Experiment) -> Array:
@@ -154,7 +125,3 @@ def fit_integral_gain(record: Record) -> float:
     error = (record["force_desired"] - record["force_measured"])[pressing]
     integral, command = TICK * np.cumsum(error)[:-1], record["memory_fx"][pressing][1:]
     return float(np.polyfit(integral, command, 1)[0])
-
-
-def _median(runs: Sequence[Tracking]) -> float:
-    return float(np.median([run.rms for run in runs]))

@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.bench import Experiment, with_values
 from palpate.records import Record
-from palpate_thesis.force_control.tracking import FOAM, RUBBER, Tracking, slot, tracking
+from palpate_thesis.force_control.tracking import FOAM, RUBBER, Tracking, hybrid, slot, tracking
 from palpate_thesis.runs import Runs
 
 SURFACES = {
@@ -20,32 +20,23 @@ TUNING_SEED = 10_000
 """Noise of the runs that gains are tuned on; the judged runs have other seeds."""
 
 
-def hybrid(kf: float, ki: float) -> dict[str, Any]:
-    """Changes that put the hybrid controller with these force gains in place of the neural one."""
-    return {"controller": {"kind": "hybrid", "kp": 400.0, "kv": 80.0, "kf": kf, "ki": ki}}
-
-
-def neural(rate: float) -> dict[str, Any]:
-    """Changes of the neural controller's learning rate, the only gain that it is tuned by."""
-    return {"controller.learning_rate": rate}
-
-
-ONE_SET = {
-    "hybrid, foam's gains": (hybrid(1.0, 0.003), "K_fp 1, K_fi 0.003"),
-    "hybrid, rubber's gains": (hybrid(0.25, 0.0015), "K_fp 0.25, K_fi 0.0015"),
-    "neural": ({}, "K_fp 0.25, η 5e-5"),
+ONE_SET: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
+    "hybrid, foam's gains": {"K_fp 1, K_fi 0.003": hybrid(1.0, 0.003)},
+    "hybrid, rubber's gains": {"K_fp 0.25, K_fi 0.0015": hybrid(0.25, 0.0015)},
+    "neural": {"K_fp 0.25, η 5e-5": {}},
 }
 """One set for both surfaces: those that section 6 gives for identification, and the neural controller's."""
-TUNED = {
+TUNED: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "hybrid, tuned": {
         f"K_fp {kf:g}, K_fi {ki:g}": hybrid(kf, ki)
         for kf, ki in product((0.25, 0.5, 1.0, 2.0), (0.0015, 0.003, 0.006, 0.012, 0.024))
     },
     "neural, tuned": {
-        f"K_fp 0.25, η {rate:g}": neural(rate) for rate in (1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4)
+        f"K_fp 0.25, η {rate:g}": {"controller.learning_rate": rate}
+        for rate in (1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4)
     },
 }
-"""Gains that are tried on each surface."""
+"""Gains that are tried on each surface; the learning rate is the only gain that the neural controller is tuned by."""
 
 
 class ForceComparison(NamedTuple):
@@ -59,26 +50,19 @@ class ForceComparison(NamedTuple):
 def compare(runs: Runs) -> ForceComparison:
     """Tune on one seed, then judge every controller on every surface over all seeds."""
     measure = tracking(*JUDGED)
-    tried = {
-        (name, surface, gains): with_values(e, changes)
-        for name, grid in TUNED.items()
-        for surface, e in SURFACES.items()
-        for gains, changes in grid.items()
-    }
-    results = runs.over([(e, TUNING_SEED) for e in tried.values()], measure)
     judged: dict[tuple[str, str], Experiment] = {}
     gains: dict[tuple[str, str], str] = {}
-    for name, (changes, text) in ONE_SET.items():
-        for surface, e in SURFACES.items():
-            judged[name, surface], gains[name, surface] = with_values(e, changes), text
-    for name, surface in product(TUNED, SURFACES):
-        errors = {key: run for key, run in zip(tried, results, strict=True) if key[:2] == (name, surface)}
-        best = best_gains(errors)
-        judged[name, surface], gains[name, surface] = tried[best], best[2]
+    for (name, grid), (surface, e) in product({**ONE_SET, **TUNED}.items(), SURFACES.items()):
+        tried = {words: with_values(e, changes) for words, changes in grid.items()}
+        best = next(iter(tried))
+        if name in TUNED:
+            errors = runs.map(lambda e: measure(runs.record(e, TUNING_SEED)), list(tried.values()))
+            best = best_gains(dict(zip(tried, errors, strict=True)))
+        judged[name, surface], gains[name, surface] = tried[best], best
     shown = {key: slot(runs.record(e), *SHOWN) for key, e in judged.items()}
     return ForceComparison(runs.by_name(judged, measure), gains, shown)
 
 
-def best_gains(errors: Mapping[tuple[str, str, str], Tracking]) -> tuple[str, str, str]:
-    """Key of the run that kept contact with the least RMS error, steps included."""
-    return min(errors, key=lambda key: errors[key].rms if errors[key].kept else np.inf)
+def best_gains(errors: Mapping[str, Tracking]) -> str:
+    """Gains of the run that kept contact with the least RMS error, steps included."""
+    return min(errors, key=lambda words: errors[words].rms if errors[words].kept else np.inf)

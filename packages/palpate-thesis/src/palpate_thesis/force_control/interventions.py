@@ -11,9 +11,11 @@ from palpate.bench.summary import LOST
 from palpate.controllers import alone
 from palpate.controllers.neural import NeuralState
 
-LOOK = 1000
-"""Ticks between two looks at the weights, unless others are given."""
 PHASE = list(COLUMNS).index("phase")
+FROM_TORQUES = slice(7, 10)
+"""Columns of the hidden weights of the 9-12-3 network from the torques among its inputs."""
+HOLD_INTERVAL = 20
+"""Ticks after which weights that are held at zero are set back."""
 Look = Callable[[float, NeuralState | None], None]
 """Called with the time since contact [s] and the state of the neural controller, None of any other."""
 
@@ -24,7 +26,7 @@ def watch(
     duration: float,
     look: Look,
     waiting: Callable[[], None] | None = None,
-    every: int = LOOK,
+    every: int = 1000,
 ) -> float | None:
     """Run like `Bench.run`, from the same random numbers, without a record, until contact is lost.
 
@@ -44,8 +46,7 @@ def watch(
         rows = march.advance(every)
         if march.contact is None:
             continue
-        phase = rows[:, PHASE]
-        lost = (phase == LOST) | ~np.isfinite(rows).all(axis=1)
+        lost = (rows[:, PHASE] == LOST) | ~np.isfinite(rows).all(axis=1)
         if lost.any():
             return (march.ticks - every + int(np.argmax(lost)) - march.contact) * march.loop.tick
         _, state = alone(march.loop.controller, march.state.controller)
@@ -53,12 +54,6 @@ def watch(
         if march.since_contact >= duration:
             return None
     return None if march.contact is not None else float("nan")
-
-
-FROM_TORQUES = slice(7, 10)
-"""Columns of the hidden weights of the 9-12-3 network from the torques among its inputs."""
-HOLD_INTERVAL = 20
-"""Ticks after which weights that are held at zero are set back."""
 
 
 def layers(state: NeuralState) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -17,7 +17,8 @@ from palpate.errors import InputError
 from palpate.files import MADE, check_place, kept_folder, with_author, write_json, write_text
 from palpate.studies.plan import Sobol
 from palpate.studies.run_one import map_unordered
-from palpate_thesis.inference.sentences import Sentence, halves, sentences, true_ids
+from palpate_thesis.claims import Sentence
+from palpate_thesis.inference.sentences import halves, searched, sentences, true_ids
 from palpate_thesis.inference.trial import Trial
 from palpate_thesis.laboratory import (
     BENCH,
@@ -31,6 +32,7 @@ from palpate_thesis.laboratory import (
 from palpate_thesis.printed_facts import contradictions
 from palpate_thesis.runs import sources_digest
 
+T = TypeVar("T")
 Fractions = tuple[float, ...]
 """A point of the search: for each unknown the fraction of its prior below the value, 0 to 1."""
 STATE, INFERRED, SENSITIVITY = "laboratory.json", "inferred.toml", "sensitivity.toml"
@@ -48,14 +50,12 @@ CANDIDATES = 8
 """Best laboratories of the search that are judged over all seeds."""
 PLAUSIBLE = 0.5
 """Least fraction of the sentences that hold in a plausible laboratory: less shows one sentence against all others."""
-PLAUSIBLE_ABOUT = (
-    "Chosen for sentences that do not hold in the inferred one, and within the printed values too."
-)
+PLAUSIBLE_ABOUT = "For sentences that do not hold in the inferred one; within the printed values too."
 ATTEMPTS = 4
 """Tried laboratories that are judged for a sentence that does not hold in the inferred one."""
 VALUES = (0.05, 0.275, 0.5, 0.725, 0.95)
 """Fractions of its prior at which an unknown is tried alone."""
-SEEDS, FULL_STEPS = tuple(range(10)), 20
+SEEDS, FULL_STEPS = range(10), 20
 """Seeds of the noise, and steps of the physics in a tick, of a judgement: those of the figures."""
 
 
@@ -67,17 +67,11 @@ class TriedLaboratory(msgspec.Struct, frozen=True):
 
 
 class SearchState(msgspec.Struct):
-    """Content of the state file.
+    """Content of the state file."""
 
-    Args:
-        stamp: identity of the search.
-        tried: laboratories in the order of their numbers.
-        judged: number of `SEEDS` in which each sentence held, by the values of a laboratory.
-    """
-
-    stamp: str
-    tried: list[TriedLaboratory] = []
-    judged: dict[str, dict[str, int]] = {}
+    stamp: str  # identity of the search
+    tried: list[TriedLaboratory] = []  # laboratories in the order of their numbers
+    judged: dict[str, dict[str, int]] = {}  # `SEEDS` in which each sentence held, by laboratory
 
 
 @dataclass(frozen=True)
@@ -98,25 +92,17 @@ class JudgedLaboratory:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """The best laboratory of a search and the hand-chosen bench, both over all seeds.
+    """The best laboratory of a search and the hand-chosen bench, both over all seeds."""
 
-    Args:
-        tried: number of laboratories.
-        bench, inferred: the two.
-        plausible: further laboratories, each with sentences that do not hold in the inferred one and hold there.
-        sensitivity: by unknown, the sentences whose truth changes when it alone takes other values of its prior.
-    """
-
-    tried: int
-    bench: JudgedLaboratory
-    inferred: JudgedLaboratory
-    plausible: tuple[tuple[Laboratory, tuple[str, ...]], ...]
-    sensitivity: Mapping[str, tuple[str, ...]]
+    tried: int  # number of laboratories
+    laboratories: Mapping[str, JudgedLaboratory]  # both by name
+    plausible: tuple[tuple[Laboratory, tuple[str, ...]], ...]  # with the sentences that hold in each
+    sensitivity: Mapping[str, tuple[str, ...]]  # by unknown, the sentences that it decides alone
 
     @property
-    def laboratories(self) -> dict[str, JudgedLaboratory]:
-        """Both laboratories by name."""
-        return {"hand-chosen bench": self.bench, "inferred": self.inferred}
+    def inferred(self) -> JudgedLaboratory:
+        """The best laboratory of the search."""
+        return self.laboratories["inferred"]
 
     def as_json(self) -> dict[str, Any]:
         """Results as the numbers of --json."""
@@ -137,32 +123,21 @@ class SearchResult:
 
 @dataclass(frozen=True)
 class LaboratorySearch:
-    """Settings of a search.
+    """Settings of a search."""
 
-    Args:
-        folder: for the state and the inferred laboratory.
-        command: command line that is written into the laboratory.
-        tries: number of laboratories; rounded up to whole generations.
-        seed: of everything drawn.
-        half: True to search by the sentences of the calibration half alone.
-        start: name or file of the laboratory that is tried first; None to start from the prior alone.
-        threads: number of threads.
-        progress: called with the name of the work, the number done and the total.
-    """
-
-    folder: Path
-    command: str
-    tries: int
-    seed: int = 1
-    half: bool = False
-    start: str | None = None
-    threads: int = 1
+    folder: Path  # for the state and the inferred laboratory
+    command: str  # command line that is written into the laboratory
+    tries: int  # number of laboratories; rounded up to whole generations
+    seed: int = 1  # of everything drawn
+    half: bool = False  # True to search by the sentences of the calibration half alone
+    start: str | None = None  # laboratory that is tried first; None to start from the prior alone
+    threads: int = 1  # number of threads
     progress: Callable[[str, int, int], None] = lambda _name, _done, _total: None
 
     @property
     def sentences(self) -> tuple[Sentence, ...]:
         """Sentences of the thesis that decide the search."""
-        return tuple(s for s in sentences() if s.searched and (s.calibrates or not self.half))
+        return searched(self.half)
 
     def run(self, *, replace: bool = False) -> SearchResult:
         """Search on from the state of the folder, and write the best laboratory.
@@ -184,7 +159,8 @@ class LaboratorySearch:
             inferred = max(judged, key=lambda lab: (lab.count_true(wanted), lab.count_runs(wanted)))
             plausible = self._find_plausible(state, inferred)
             sensitivity = self._find_sensitivity(inferred.laboratory)
-            result = SearchResult(len(state.tried), bench, inferred, plausible, sensitivity)
+            both = {"hand-chosen bench": bench, "inferred": inferred}
+            result = SearchResult(len(state.tried), both, plausible, sensitivity)
             self._write(result)
             return result
 
@@ -200,7 +176,7 @@ class LaboratorySearch:
             if done == 0 and self.start is not None:
                 points[0] = prior_fractions(load_laboratory(self.start))
             return points
-        parents = sorted(tried, key=lambda laboratory: -len(laboratory.true))[:PARENTS]
+        parents = _rank(tried)[:PARENTS]
         rng = np.random.default_rng([self.seed, done])
         children: list[Fractions] = []
         while len(children) < GENERATION:
@@ -210,24 +186,32 @@ class LaboratorySearch:
         return children
 
     def _try_generation(self, points: Sequence[Fractions], first: int) -> list[TriedLaboratory]:
-        """Try the points with a noise of their own each; the runs under way stop with the caller."""
-        stop = threading.Event()
+        """Try the points with a noise of their own each."""
 
-        def attempt(number: int) -> tuple[int, TriedLaboratory]:
+        def attempt(number: int, stopped: Callable[[], bool]) -> TriedLaboratory:
             point = points[number - first]
             if contradictions(laboratory_at(point)):
-                return number, TriedLaboratory(point, ())
-            trial = Trial(laboratory_at(point), number, stopped=stop.is_set)
-            return number, TriedLaboratory(point, true_ids(trial, self.sentences))
+                return TriedLaboratory(point, ())
+            trial = Trial(laboratory_at(point), number, stopped=stopped)
+            return TriedLaboratory(point, true_ids(trial, self.sentences))
 
-        results: dict[int, TriedLaboratory] = {}
+        end = first + len(points)
+        return self._in_parallel("laboratories", attempt, range(first, end), max(self.tries, end))
+
+    def _in_parallel(
+        self, name: str, attempt: Callable[[int, Callable[[], bool]], T], numbers: range, total: int
+    ) -> list[T]:
+        """Results of each number, in their order; the runs under way stop with the caller."""
+        stop = threading.Event()
+        results: dict[int, T] = {}
         try:
-            for number, result in map_unordered(attempt, range(first, first + len(points)), self.threads):
+            work = map_unordered(lambda n: (n, attempt(n, stop.is_set)), numbers, self.threads)
+            for number, result in work:
                 results[number] = result
-                self.progress("laboratories", first + len(results), max(self.tries, first + len(points)))
+                self.progress(name, numbers.start + len(results), total)
         finally:
             stop.set()
-        return [results[number] for number in sorted(results)]
+        return [results[number] for number in numbers]
 
     def _find_plausible(
         self, state: SearchState, inferred: JudgedLaboratory
@@ -238,39 +222,36 @@ class LaboratorySearch:
         """
         missing = {s.id: s for s in self.sentences if not inferred.count_true([s])}
         enough = PLAUSIBLE * len(self.sentences)
-        ranked = sorted(
-            (laboratory for laboratory in state.tried if len(laboratory.true) >= enough),
-            key=lambda laboratory: -len(laboratory.true),
-        )
-        plausible: list[tuple[Laboratory, tuple[str, ...]]] = []
-        for name in tuple(missing):
-            if name not in missing:
+        ranked = [lab for lab in _rank(state.tried) if len(lab.true) >= enough]
+        plausible: dict[Laboratory, tuple[str, ...]] = {}
+        for name in missing:
+            if any(name in ids for ids in plausible.values()):
                 continue
-            for tried in [laboratory for laboratory in ranked if name in laboratory.true][:ATTEMPTS]:
+            for tried in [lab for lab in ranked if name in lab.true][:ATTEMPTS]:
+                elsewhere = {id_ for ids in plausible.values() for id_ in ids}
                 laboratory = laboratory_at(tried.fractions)
-                among = [s for s in missing.values() if s.id in tried.true]
+                among = [s for s in missing.values() if s.id in tried.true and s.id not in elsewhere]
                 counts = self._count_seeds(state, laboratory, among)
                 true = tuple(s.id for s in among if s.is_true(counts[s.id], len(SEEDS)))
                 if name in true:
-                    plausible.append((laboratory, true))
-                    missing = {key: s for key, s in missing.items() if key not in true}
+                    plausible[laboratory] = true
                     break
-        return tuple(plausible)
+        return tuple(plausible.items())
 
     def _find_sensitivity(self, laboratory: Laboratory) -> dict[str, tuple[str, ...]]:
         """Change one unknown at a time to values of its prior, and find the sentences whose truth changes."""
-        reference, point = self._true_once(laboratory), list(prior_fractions(laboratory))
-        changed: dict[str, tuple[str, ...]] = {}
-        for i, u in enumerate(UNKNOWNS):
-            others = [laboratory_at([*point[:i], fraction, *point[i + 1 :]]) for fraction in VALUES]
-            results = map_unordered(self._true_once, dict.fromkeys(others), self.threads)
-            differing = set().union(*(reference ^ true for true in results))
-            changed[u.name] = tuple(s.id for s in sentences() if s.id in differing)
-            self.progress("unknowns, one at a time", i + 1, len(UNKNOWNS))
-        return changed
+        among, point = searched(half=False), prior_fractions(laboratory)
+        reference = set(true_ids(Trial(laboratory), among))
 
-    def _true_once(self, laboratory: Laboratory) -> frozenset[str]:
-        return frozenset(true_ids(Trial(laboratory), [s for s in sentences() if s.searched]))
+        def attempt(i: int, stopped: Callable[[], bool]) -> tuple[str, ...]:
+            others = {laboratory_at([*point[:i], fraction, *point[i + 1 :]]) for fraction in VALUES}
+            true = (true_ids(Trial(other, stopped=stopped), among) for other in others)
+            differing = set().union(*(reference.symmetric_difference(ids) for ids in true))
+            return tuple(s.id for s in sentences() if s.id in differing)
+
+        numbers = range(len(UNKNOWNS))
+        changed = self._in_parallel("unknowns, one at a time", attempt, numbers, len(UNKNOWNS))
+        return {u.name: ids for u, ids in zip(UNKNOWNS, changed, strict=True)}
 
     def _count_seeds(
         self, state: SearchState, laboratory: Laboratory, among: Sequence[Sentence]
@@ -278,23 +259,14 @@ class LaboratorySearch:
         """Number of seeds in which each sentence holds; from the state if it has been counted before."""
         key = f"{laboratory.numbers()} {len(among)} {among[0].id}"
         if key not in state.judged:
-            state.judged[key] = dict(self._run_seeds(laboratory, among))
+
+            def attempt(seed: int, stopped: Callable[[], bool]) -> tuple[str, ...]:
+                return true_ids(Trial(laboratory, seed, FULL_STEPS, stopped), among)
+
+            runs = self._in_parallel("a laboratory over all seeds", attempt, SEEDS, len(SEEDS))
+            state.judged[key] = dict(Counter(id_ for ids in runs for id_ in ids))
             self._save(state)
         return Counter(state.judged[key])
-
-    def _run_seeds(self, laboratory: Laboratory, among: Sequence[Sentence]) -> Counter[str]:
-        def attempt(seed: int) -> tuple[str, ...]:
-            return true_ids(Trial(laboratory, seed, FULL_STEPS, stop.is_set), among)
-
-        stop = threading.Event()
-        held: Counter[str] = Counter()
-        try:
-            for done, ids in enumerate(map_unordered(attempt, SEEDS, self.threads), 1):
-                held.update(ids)
-                self.progress("a laboratory over all seeds", done, len(SEEDS))
-        finally:
-            stop.set()
-        return held
 
     def _load(self) -> SearchState:
         path = self.folder / STATE
@@ -348,8 +320,11 @@ class LaboratorySearch:
 
 def find_best(tried: Sequence[TriedLaboratory]) -> list[Fractions]:
     """Points with most true sentences; of equal ones the earliest."""
-    ranked = sorted(tried, key=lambda laboratory: -len(laboratory.true))
-    return [laboratory.fractions for laboratory in ranked[:CANDIDATES]]
+    return [laboratory.fractions for laboratory in _rank(tried)[:CANDIDATES]]
+
+
+def _rank(tried: Sequence[TriedLaboratory]) -> list[TriedLaboratory]:
+    return sorted(tried, key=lambda laboratory: -len(laboratory.true))
 
 
 def _make_child(parents: Sequence[TriedLaboratory], rng: np.random.Generator) -> Fractions:

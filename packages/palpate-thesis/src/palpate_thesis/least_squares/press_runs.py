@@ -1,6 +1,6 @@
-"""Presses for the least-squares figures, their estimates, and varied conditions."""
+"""Presses for the least-squares figures, and their estimates."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,7 +9,6 @@ from palpate.arrays import Array, Mask
 from palpate.bench import Experiment, load, with_values
 from palpate.bench.summary import CONTACT
 from palpate.records import Record
-from palpate_thesis.runs import NEAREST_WALL, move_wall, rougher
 
 PRESS = 8.0
 """Seconds of contact: the first four as in figures 6.1, 6.3 and 6.4, and the slot of 6.2 and 6.5."""
@@ -19,12 +18,11 @@ MASS_FROM = 10
 """First sample of a mass that sets the scale of its panel."""
 SLOT = (6.0, 8.0)
 """Chosen: "some time after" the first slot [s]."""
-
-
-def own_damping(surface: Mapping[str, Any]) -> float:
-    """Damping of a surface [N s/m]: at 20 N if it grows with the depth; of a relaxing one, that of its dashpot."""
-    damping = float(surface["damping"])
-    return damping * 20.0 / float(surface["stiffness"]) if surface["kind"] == "hunt-crossley" else damping
+MOVING = 0.5
+"""Seconds after the change-over in which the surface moves enough for B and M to be looked for."""
+LEAST_VELOCITY, LEAST_ACCELERATION = 1e-4, 0.05
+"""Least of a sample that counts [m/s, m/s^2]: below are an encoder count in ten ticks, and the filter's residue."""
+QUANTILES = (10.0, 50.0, 90.0)
 
 
 def nearer(experiment: Experiment) -> Experiment:
@@ -41,10 +39,16 @@ PLAIN = nearer(with_values(load("foam-rls"), {"run.press": PRESS, "surface.stiff
 RELAXING = nearer(with_values(load("foam-viscoelastic"), {"run.press": PRESS}))
 RUBBER = nearer(with_values(load("rubber-rls"), {"run.press": PRESS}))
 COLUMNS = (
-    *("t", "force", "force_sampled", "force_measured", "displacement", "x", "x_measured"),
-    *("vx_raw", "ax_raw", "ax_measured", "penetration"),
+    *("t", "force", "force_sampled", "force_measured", "displacement", "vx_raw", "ax_measured"),
     *(f"{key}_{front}" for front in ("thesis", "raw", "matched") for key in "MBK"),
 )
+
+
+def own_values(surface: Mapping[str, Any]) -> dict[str, float]:
+    """K, B and M of a surface; B at 20 N if it grows with the depth, that of the dashpot if the surface relaxes."""
+    K, B = float(surface["stiffness"]), float(surface["damping"])
+    at_20_newtons = B * 20.0 / K if surface["kind"] == "hunt-crossley" else B
+    return {"K": K, "B": at_20_newtons, "M": float(surface["mass"])}
 
 
 def contact(record: Record) -> Record:
@@ -61,12 +65,6 @@ def contact(record: Record) -> Record:
 def between(press: Record, start: float, stop: float) -> Mask:
     """Mask of the samples of a press in a time slot [s]."""
     return (press["t"] >= start) & (press["t"] < stop)
-
-
-def at(press: Record, column: str, time: float) -> float:
-    """Value of a column `time` seconds after the change-over; NaN if the press was shorter."""
-    i = round(time * 1000)
-    return float(press[column][i]) if i < len(press) else float("nan")
 
 
 def ratio(press: Record) -> float:
@@ -97,21 +95,6 @@ def _within_after(values: Array, band: float, scale: float, tick: float) -> floa
     return (float(outside[-1]) + 1.0) * tick if len(outside) else 0.0
 
 
-def conditions(experiment: Experiment) -> dict[str, Experiment]:
-    """Variations of one unstated parameter at a time: friction, pose, the surface's B and M."""
-    surface = experiment.surface
-    by: dict[str, Mapping[str, Any]] = {
-        "friction halved": rougher(experiment, 0.5, "coulomb", "static"),
-        "friction doubled": rougher(experiment, 2.0, "coulomb", "static"),
-        "wall at 0.457 m": move_wall(experiment, NEAREST_WALL),
-        "wall at 0.49 m": move_wall(experiment, 0.49),
-        "B halved": {"surface.damping": 0.5 * surface.damping},
-        "B doubled": {"surface.damping": 2.0 * surface.damping},
-        "M = 0.5 kg": {"surface.mass": 0.5},
-    }
-    return {name: with_values(experiment, changes) for name, changes in by.items()}
-
-
 class PressEstimates(NamedTuple):
     """Least-squares estimates of one press."""
 
@@ -125,7 +108,8 @@ class PressEstimates(NamedTuple):
     settled_M: float  # [s]
     settled_B: float
     settled_K: float
-    true_B: float  # damping of the surface: see `own_damping` [N s/m]
+    true_B: float  # damping of the surface: see `own_values` [N s/m]
+    samples: dict[str, tuple[float, ...]]  # quantiles of K, B, M by single samples: see `by_ratios`
 
     @property
     def apart(self) -> float:
@@ -141,15 +125,39 @@ class PressEstimates(NamedTuple):
 def press_estimates(record: Record) -> PressEstimates:
     """Estimates of the first press of a run."""
     press = contact(record)
-    end = SLOT[1] - 0.002
-    values = {name: at(press, f"{name}_thesis", end) for name in "MBK"}
-    raw = {f"{name}_raw": at(press, f"{name}_raw", end) for name in "MBK"}
+    last = round((SLOT[1] - 0.002) * 1000)
+
+    def at_end(column: str) -> float:
+        return float(press[column][last]) if last < len(press) else float("nan")
+
+    values = {name: at_end(f"{name}_thesis") for name in "MBK"}
+    raw = {f"{name}_raw": at_end(f"{name}_raw") for name in "MBK"}
     settled = {f"settled_{name}": settled_after(press[f"{name}_thesis"]) for name in "BK"}
     settled["settled_M"] = mass_settled_after(press["M_thesis"])
-    damping = own_damping(record.meta["experiment"]["surface"])
-    return PressEstimates(ratio(press), **values, **raw, **settled, true_B=damping)
+    damping = own_values(record.meta["experiment"]["surface"])["B"]
+    return PressEstimates(ratio(press), **values, **raw, **settled, true_B=damping, samples=by_ratios(press))
 
 
-def median(values: Sequence[float] | Array) -> float:
-    """Median of the values that are numbers."""
-    return float(np.nanmedian(np.asarray(values, dtype=float)))
+def by_ratios(press: Record) -> dict[str, tuple[float, ...]]:
+    """Quantiles of single-sample estimates by the three ratios of sec. 5.1, each using the result of the previous one.
+
+    K = f/x where all rests; B = (f - K x)/v while the surface moves, of the half of the samples with the smaller
+    acceleration, for the thesis asks for none; M = (f - K x - B v)/a. A ratio needs its denominator: samples in which
+    the encoders show no motion are left out.
+    """
+    rest, moving = between(press, *SLOT), between(press, 0.0, MOVING)
+    f, x = press["force_measured"], press["displacement"]
+    v, a = press["vx_raw"][moving], press["ax_measured"][moving]
+    stiffness = _quantiles(f[rest] / x[rest])
+    rest_force = f[moving] - stiffness[1] * x[moving]
+    used = (np.abs(v) > LEAST_VELOCITY) & (np.abs(a) <= np.median(np.abs(a)))
+    damping = _quantiles(rest_force[used] / v[used])
+    rest_force = rest_force - damping[1] * v
+    used = np.abs(a) > LEAST_ACCELERATION
+    return {"K": stiffness, "B": damping, "M": _quantiles(rest_force[used] / a[used])}
+
+
+def _quantiles(values: Array) -> tuple[float, ...]:
+    if not len(values):
+        return (float("nan"),) * len(QUANTILES)
+    return tuple(map(float, np.percentile(values, QUANTILES)))

@@ -16,8 +16,8 @@ from palpate_thesis.runs import Runs
 
 PRESS = 4.0
 """Seconds of contact that the figures show [s]."""
-LATE = 0.5
-"""Seconds at the end over which answers, force and displacement are averaged [s]."""
+LATE_SAMPLES = 500
+"""Milliseconds at the end over which answers, force and displacement are averaged."""
 FOAM = press_runs.nearer(with_values(load("foam-rls"), {"run.press": PRESS, "surface.stiffness": 5450.0}))
 """Its K is chosen so that f/x comes out near the thesis' 6.7 kN/m."""
 RUBBER = press_runs.nearer(
@@ -31,47 +31,43 @@ MEAN_OVER = 0.05
 GONE = 1.0
 """An error of the output is almost zero within this [N]: 5 % of the desired force."""
 TICK = 1e-3
+RUBBER_BAND = 0.15
+"""Maximum relative difference of a realistic K and f/x: on rubber the thesis' own are 10 % apart."""
+SMALL = 1.0
+"""Upper limit of a small mass [kg]."""
+DAMPING_FACTOR = 2.0
+"""Largest factor between a realistic damping and the surface's own: the thesis calls B_e of both methods realistic,
+although the network's is the smaller one on rubber."""
 
 
 class NetworkPress(NamedTuple):
-    """One contact, as the thesis' identifiers are given it.
+    """One contact, as the thesis' identifiers are given it, and what is known of it."""
 
-    Args:
-        surface: whose scales and probe the thesis gives: "foam" or "rubber".
-        inputs: displacement [m], velocity [m/s], acceleration [m/s^2], shape (n, 3), one a millisecond.
-        force: filtered [N], shape (n,).
-        ratio: f/x at the end [N/m].
-        squares: M, B, K of recursive least squares, shape (n, 3).
-    """
-
-    surface: str
-    inputs: Array
-    force: Array
-    ratio: float
-    squares: Array
+    surface: str  # whose scales and probe the thesis gives: "foam" or "rubber"
+    inputs: Array  # displacement [m], velocity [m/s], acceleration [m/s^2], shape (n, 3), one a millisecond
+    force: Array  # filtered [N], shape (n,)
+    ratio: float  # f/x at the end [N/m]
+    squares: Array  # K, B, M of recursive least squares, shape (n, 3)
+    matched: Array  # K, B, M of least squares on channels that share one lag, shape (n, 3)
+    truth: Array  # K, B, M of the surface, shape (3,)
 
     @property
     def rest(self) -> float:
         """Mean displacement at the end [m]."""
-        return float(self.inputs[-round(LATE / TICK) :, 0].mean())
+        return float(self.inputs[-LATE_SAMPLES:, 0].mean())
 
 
 def press_of(record: Record, surface: str) -> NetworkPress:
-    """The first contact of a run."""
-    first = press_runs.contact(record)
-    inputs = np.column_stack([first[c] for c in ("displacement", "vx_raw", "ax_measured")])
-    late = round(LATE / TICK)
-    ratio = first["force_measured"][-late:].mean() / first["displacement"][-late:].mean()
-    squares = np.column_stack([first[f"{key}_thesis"] for key in "MBK"])
-    return NetworkPress(surface, inputs, first["force_measured"], float(ratio), squares)
-
-
-def cut(press: NetworkPress, seconds: float) -> NetworkPress:
-    """The first seconds of a press; f/x is that of its own end."""
-    n, late = round(seconds / TICK), round(LATE / TICK)
-    inputs, force = press.inputs[:n], press.force[:n]
-    ratio = float(force[-late:].mean() / inputs[-late:, 0].mean())
-    return NetworkPress(press.surface, inputs, force, ratio, press.squares[:n])
+    """The first seconds of the first contact of a run."""
+    first, n = press_runs.contact(record), round(PRESS / TICK)
+    inputs = np.column_stack([first[c][:n] for c in ("displacement", "vx_raw", "ax_measured")])
+    force = first["force_measured"][:n]
+    ratio = float(force[-LATE_SAMPLES:].mean() / inputs[-LATE_SAMPLES:, 0].mean())
+    squares, matched = (
+        np.column_stack([first[f"{key}_{front}"][:n] for key in "KBM"]) for front in ("thesis", "matched")
+    )
+    truth = np.array(list(press_runs.own_values(record.meta["experiment"]["surface"]).values()))
+    return NetworkPress(surface, inputs, force, ratio, squares, matched, truth)
 
 
 def presses(runs: Runs, experiment: Experiment, surface: str) -> list[NetworkPress]:
@@ -101,11 +97,6 @@ class NetworkChoice(NamedTuple):
         return kind(setting, self.amplitude, self.rate, seed=start, weights=weights, thresholds=thresholds)
 
 
-def chosen_network(runs: Runs) -> NetworkChoice:
-    """The network of the runs' laboratory."""
-    return identifier_network(runs.laboratory)
-
-
 def identifier_network(laboratory: Laboratory, rate: float = 1e-4) -> NetworkChoice:
     """The network of a laboratory."""
     lab = laboratory
@@ -117,8 +108,8 @@ def starts(runs: Runs) -> tuple[int, ...]:
     return STARTS if runs.laboratory.start is None else (int(runs.laboratory.start),)
 
 
-class Coefficients(NamedTuple):
-    """K, B and M of a method along a press: means over the last half second, and settling times."""
+class Identified(NamedTuple):
+    """Answer of one method on one press: K, B and M, means over the last half second, and their settling times."""
 
     K: float  # [N/m]
     B: float  # [N s/m]
@@ -126,27 +117,10 @@ class Coefficients(NamedTuple):
     settled_K: float  # time from which it stays within 10 % of its last value [s]
     settled_B: float
     settled_M: float  # within 10 % of its largest value: see `mass_settled_after`
-
-
-def coefficients(curve: Array) -> Coefficients:
-    """Values and settling times of K, B, M along a press, shape (n, 3)."""
-    end = len(curve) * TICK
-    k, b = (press_runs.settled_after(values, end) for values in curve.T[:2])
-    K, B, M = map(float, curve[-round(LATE / TICK) :].mean(axis=0))
-    return Coefficients(K, B, M, k, b, press_runs.mass_settled_after(curve[:, 2], end))
-
-
-class NetworkAnswer(NamedTuple):
-    """Answer of one network after one press."""
-
-    K: float  # these six as in `Coefficients`
-    B: float
-    M: float
-    settled_K: float
-    settled_B: float
-    settled_M: float
+    ripple: float  # standard deviation of K in the last half second, relative to K
     ratio: float  # f/x of the press [N/m]
     squares_B: float  # least squares' B of the same press [N s/m]
+    truth: Array  # K, B, M of the surface, shape (3,)
     error_gone: float  # from when on the mean error of the output is within GONE [s]; infinite: never
 
     @property
@@ -154,12 +128,35 @@ class NetworkAnswer(NamedTuple):
         """K as a multiple of f/x."""
         return self.K / self.ratio
 
+    @property
+    def relative_B(self) -> float:
+        """B as a multiple of the surface's own."""
+        return float(self.B / self.truth[1])
 
-def answer(press: NetworkPress, choice: NetworkChoice, start: int) -> NetworkAnswer:
-    """Lets one network learn from one press."""
-    _, curve = learn(press, choice, start)
-    gone, squares_B = error_gone(curve[:, 3]), float(press.squares[-1, 1])
-    return NetworkAnswer(*coefficients(curve[:, :3]), press.ratio, squares_B, gone)
+    @property
+    def realistic(self) -> tuple[bool, bool, bool]:
+        """True for each of K, B and M that is realistic."""
+        return (
+            abs(self.over - 1.0) <= RUBBER_BAND,
+            1.0 / DAMPING_FACTOR <= self.relative_B <= DAMPING_FACTOR,
+            0.0 < self.M < SMALL,
+        )
+
+    @property
+    def errors(self) -> tuple[float, float]:
+        """Distance of B and M from the surface's own [N s/m, kg]."""
+        return abs(float(self.B - self.truth[1])), abs(float(self.M - self.truth[2]))
+
+
+def identified(press: NetworkPress, curve: Array) -> Identified:
+    """Answer of a method from its K, B, M, and the error of its output if it has one, shape (n, 3) or (n, 4)."""
+    end, late = len(curve) * TICK, curve[-LATE_SAMPLES:]
+    K, B, M = map(float, late[:, :3].mean(axis=0))
+    k, b = (press_runs.settled_after(values, end) for values in curve.T[:2])
+    m = press_runs.mass_settled_after(curve[:, 2], end)
+    ripple, squares_B = float(late[:, 0].std() / abs(K)), float(press.squares[-1, 1])
+    gone = error_gone(curve[:, 3]) if curve.shape[1] > 3 else float("nan")
+    return Identified(K, B, M, k, b, m, ripple, press.ratio, squares_B, press.truth, gone)
 
 
 def tangent(probe: NeuralProbe, x: float) -> float:
@@ -185,7 +182,7 @@ def error_gone(error: Array) -> float:
     return float("inf") if large[-1] == len(error) - 1 else float((large[-1] + 1) * TICK)
 
 
-def answers(runs: Runs, contacts: Sequence[NetworkPress], choice: NetworkChoice) -> list[NetworkAnswer]:
+def answers(runs: Runs, contacts: Sequence[NetworkPress], choice: NetworkChoice) -> list[Identified]:
     """Every start on every press."""
-    cases = [(press, choice, start) for press in contacts for start in starts(runs)]
-    return runs.map(lambda case: answer(*case), cases)
+    cases = [(press, start) for press in contacts for start in starts(runs)]
+    return runs.map(lambda case: identified(case[0], learn(case[0], choice, case[1])[1]), cases)
