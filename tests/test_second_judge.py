@@ -105,6 +105,13 @@ def test_precision_of_the_estimator_that_knows_is_that_of_least_squares():
     assert laboratory.known_half(scene, 0.5, 0.02, 0.0, 0.0) == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.parametrize(("world", "seed", "index"), [("fracture", 31, 2)])
+def test_no_answer_is_wrong_on_these_logs_again(world, seed, index):
+    results = judge.run(world, seed, index, plain=0)["results"]
+    assert results
+    assert [r["name"] for r in results if r["away"] > judge.WRONG] == []
+
+
 @pytest.mark.parametrize("name", judge.NAMES)
 def test_a_log_is_that_of_its_seed(name):
     log, again, other = (laboratory.draw(name, 3, seed) for seed in (5, 5, 6))
