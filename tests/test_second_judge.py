@@ -105,11 +105,19 @@ def test_precision_of_the_estimator_that_knows_is_that_of_least_squares():
     assert laboratory.known_half(scene, 0.5, 0.02, 0.0, 0.0) == pytest.approx(expected, rel=1e-3)
 
 
-@pytest.mark.parametrize(("world", "seed", "index"), [("fracture", 31, 2)])
+@pytest.mark.parametrize(
+    ("world", "seed", "index"),
+    [
+        ("fracture", 31, 2),  # a break in a fast press was taken for a tap
+        ("fracture", 32, 2),  # the press that was stiffer passed the window too fast, and was left out
+        ("muscle_tone", 31, 1),  # a force that changes during one press
+        ("slipping_clamp", 31, 2),
+    ],
+)
 def test_no_answer_is_wrong_on_these_logs_again(world, seed, index):
-    results = judge.run(world, seed, index, plain=0)["results"]
-    assert results
-    assert [r["name"] for r in results if r["away"] > judge.WRONG] == []
+    row = judge.run(world, seed, index, plain=0)
+    assert row["answer"]["working_point"]
+    assert [r["name"] for r in row["results"] if r["away"] > judge.WRONG] == []
 
 
 @pytest.mark.parametrize("name", judge.NAMES)
