@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from identification.problems import contradictions
+
 FOLDER = Path(__file__).resolve().parent.parent / "benchmarks" / "second_judge"
 sys.path.insert(0, str(FOLDER))
 
@@ -118,6 +120,18 @@ def test_no_answer_is_wrong_on_these_logs_again(world, seed, index):
     row = judge.run(world, seed, index, plain=0)
     assert row["answer"]["working_point"]
     assert [r["name"] for r in row["results"] if r["away"] > judge.WRONG] == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", judge.NAMES)
+def test_headline_parameter_and_tangents_agree_at_one_force(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for index in range(3):
+        log = laboratory.draw(name, index, 34)
+        Path("press.csv").write_text(log.text, encoding="ascii")
+        code, out = judge.typed([*judge.command("press.csv", log.options), "--json"])
+        assert code < 2
+        assert contradictions(json.loads(out)) == []
 
 
 @pytest.mark.parametrize("name", judge.NAMES)

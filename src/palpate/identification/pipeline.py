@@ -324,14 +324,20 @@ def _traces(log: _PreparedLog, choice: Choice | None) -> Traces:
     size = max(len(problem.force) // _MAX_TRACE_SAMPLES, 1)
     linear = fitted.model.linear
     mass = problem.lag.mass
-    columns = fitted.model.columns(problem.motion, fitted.theta, fitted.lag)
+    motion = problem.motion
+    columns = fitted.model.columns(motion, fitted.theta, fitted.lag)
+    # As the press and the working point: the depth from where contact is seen, the force from where it rests.
+    position = motion.position[0] + (0.0 if motion.free is None else motion.free[0])
+    surface = float(choice.problem.motion.position[0] - position)
+    rest = problem.contacts.resting
+    rows_rest = 0.0 if problem.counted else rest
     return Traces(
         time,
-        chain(problem.contacts.force_sign * channels.force)[::stride] - problem.resting,
+        chain(problem.contacts.force_sign * channels.force)[::stride] - rest,
         block_means(channels.start + problem.time, size),
-        block_means(problem.motion.moved(0, fitted.lag), size),
-        block_means(problem.force, size),
-        block_means(fitted.force, size),
+        block_means(motion.moved(0, fitted.lag) + surface, size),
+        block_means(problem.force - rows_rest, size),
+        block_means(fitted.force - rows_rest, size),
         {name: block_means(c, size) for name, c in zip(linear, columns, strict=True)},
         {name: fitted[name] for name in linear},
         {"M": mass[1]} if mass and "M" in linear else {},
