@@ -114,6 +114,7 @@ def test_precision_of_the_estimator_that_knows_is_that_of_least_squares():
         ("fracture", 32, 2),  # the press that was stiffer passed the window too fast, and was left out
         ("muscle_tone", 31, 1),  # a force that changes during one press
         ("slipping_clamp", 31, 2),
+        ("two_surfaces", 33, 0),  # the softer surface's press ended below the force of the tangent
     ],
 )
 def test_no_answer_is_wrong_on_these_logs_again(world, seed, index):

@@ -29,7 +29,7 @@ from palpate.identification.spectrum import (
     storage_near,
     working_point,
 )
-from palpate.identification.steady_press import HALF_WINDOW, Slopes, SteadyPress, thin_curve
+from palpate.identification.steady_press import HALF_WINDOW, WINDOW, Slopes, SteadyPress, thin_curve
 from palpate.identification.uncertainty import Contribution, Measurement, half_width
 from palpate.signals.samples import runs
 
@@ -276,7 +276,8 @@ def _among_loadings(headline: Slopes, problem: Problem) -> Slopes:
     """A tangent of strokes at constant speed, with its difference from the log's other loadings as a cause.
 
     The square of the difference, less those of the half-widths, is the variance between the two (Paule and Mandel,
-    1982): a stroke may be the second on a surface that has yielded.
+    1982): a stroke may be the second on a surface that has yielded. Loadings that end below the tangent's force are
+    compared at a force that all reach, and the relative scatter there counts.
     """
     lag = problem.lag.value
     loadings = loadings_in(problem, lag)
@@ -293,7 +294,14 @@ def _among_loadings(headline: Slopes, problem: Problem) -> Slopes:
     difference = tangent.value - stiffness.value
     excess = max(difference**2 - tangent.half**2 - stiffness.half**2, 0.0)
     scatter = Contribution.within(float(np.sqrt(excess)))
-    return replace(headline, stiffness=stiffness.with_cause("loadings", scatter))
+    lowest = min(float(loading.force.max()) for loading in loadings)
+    if lowest < headline.force + resting:
+        level = low + float(np.mean(WINDOW)) * (lowest - low)
+        shared = tangent_at(problem, lag, loadings, level, within, None)
+        if shared is not None and "repetition" in shared.contributions:
+            relative = shared.contributions["repetition"].times(stiffness.value / shared.value)
+            scatter = max(scatter, relative, key=lambda contribution: contribution.half)
+    return headline.with_cause("loadings", scatter)
 
 
 def stiffness_at_point(problem: Problem, force: Array, point: WorkingPoint) -> float | None:
