@@ -271,18 +271,12 @@ def slopes_at(
     shrinkage = np.maximum(1 - noises / np.maximum(differences**2, 1e-300), 0.0)
     slopes = slopes + shrinkage * differences
     bias_variances = shrinkage * noises
-    # A stroke that passes the window too fast for a curve has a secant, as the others have: a stiffer surface is passed
-    # in fewer rows, and must not be left out for that.
-    brief = [curve for curve, window in passes if window is None]
-    if brief:
-        usual = np.mean([curve.secant(begin, end) for curve, window in passes if window is not None])
-        secants = np.array([curve.secant(begin, end) for curve in brief]) * slopes.mean() / usual
-        errors = 2 * (secants * [white_noise(curve.force) / (end - begin) for curve in brief]) ** 2
-        slopes, variances = np.r_[slopes, secants], np.r_[variances, errors]
-        rows = np.r_[np.arange(len(windows)), np.zeros(len(brief), np.intp)]
-        bends, drifts, depths, bias_variances = (
-            values[rows] for values in (bends, drifts, depths, bias_variances)
-        )
+    brief, errors = _brief_slopes(passes, begin, end, float(slopes.mean()))
+    slopes, variances = np.r_[slopes, brief], np.r_[variances, errors]
+    rows = np.r_[np.arange(len(windows)), np.zeros(len(brief), np.intp)]
+    bends, drifts, depths, bias_variances = (
+        values[rows] for values in (bends, drifts, depths, bias_variances)
+    )
     mean = random_effects(slopes, variances + bias_variances)
     n = len(slopes)
     weight = 1 / np.maximum(variances + mean.between**2, 1e-300)
@@ -306,6 +300,21 @@ def slopes_at(
     depth = float(weight @ depths)
     stiffness = Measurement(value, parts)
     return Slopes(level - rest, depth, stiffness, tuple(slopes.tolist()), mean.next_half, rise)
+
+
+def _brief_slopes(
+    passes: Sequence[tuple[Curve, Curve | None]], begin: float, end: float, slope: float
+) -> tuple[Array, Array]:
+    """Slopes [N/m] and their variances of strokes that pass a window of the force [N] too fast for a curve, shape (k,).
+
+    Each has a secant, and so have the others, whose mean slope is given: a stiffer surface is passed in fewer rows, and
+    must not be left out for that.
+    """
+    usual = np.mean([curve.secant(begin, end) for curve, window in passes if window is not None])
+    brief = [curve for curve, window in passes if window is None]
+    slopes = np.array([curve.secant(begin, end) for curve in brief]) * slope / usual
+    noise = np.array([white_noise(curve.force) for curve in brief])
+    return slopes, 2 * (slopes * noise / (end - begin)) ** 2
 
 
 _WINDOWS = (WINDOW, *((level - HALF_WINDOW, min(level + HALF_WINDOW, 1.0)) for level in LEVELS))
