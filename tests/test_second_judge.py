@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from identification.problems import contradictions
+
 FOLDER = Path(__file__).resolve().parent.parent / "benchmarks" / "second_judge"
 sys.path.insert(0, str(FOLDER))
 
@@ -103,6 +105,34 @@ def test_precision_of_the_estimator_that_knows_is_that_of_least_squares():
     force = laboratory.read_force(scene, p)
     expected = 1.96 * 0.02 / np.sqrt(np.sum(force**2))  # zero and lag are orthogonal to a sine
     assert laboratory.known_half(scene, 0.5, 0.02, 0.0, 0.0) == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("world", "seed", "index"),
+    [
+        ("fracture", 31, 2),  # a break in a fast press was taken for a tap
+        ("fracture", 32, 2),  # the press that was stiffer passed the window too fast, and was left out
+        ("muscle_tone", 31, 1),  # a force that changes during one press
+        ("slipping_clamp", 31, 2),
+        ("two_surfaces", 33, 0),  # the softer surface's press ended below the force of the tangent
+    ],
+)
+def test_no_answer_is_wrong_on_these_logs_again(world, seed, index):
+    row = judge.run(world, seed, index, plain=0)
+    assert row["answer"]["working_point"]
+    assert [r["name"] for r in row["results"] if r["away"] > judge.WRONG] == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", judge.NAMES)
+def test_headline_parameter_and_tangents_agree_at_one_force(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for index in range(3):
+        log = laboratory.draw(name, index, 34)
+        Path("press.csv").write_text(log.text, encoding="ascii")
+        code, out = judge.typed([*judge.command("press.csv", log.options), "--json"])
+        assert code < 2
+        assert contradictions(json.loads(out)) == []
 
 
 @pytest.mark.parametrize("name", judge.NAMES)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from identification.problems import contradictions
 from identification.synthetic_contacts import coloured, record
 from palpate.identification import Verdict, identify
 from palpate.logs import read_log
@@ -45,6 +46,22 @@ def test_no_log_gives_a_confident_negative_mass_or_damping(force):
         for name in ("B", "M", "K", "K1"):
             p = found.parameters.get(name)
             assert p is None or p.verdict is not Verdict.IDENTIFIED or p.value > 0
+
+
+@measured
+@pytest.mark.parametrize(
+    "force", [40, *(pytest.param(f, marks=pytest.mark.long) for f in (20, 400, 600, 800))]
+)
+def test_a_press_has_one_stiffness_and_one_curve(force):
+    """Headline, K and tangents agree at one force, and the loading that is drawn lies on the rows of the contact."""
+    found = identify(skin(force))
+    assert contradictions(found.to_json()) == []
+    rows = np.stack([found.traces.fitted_position, found.traces.fitted_force])
+    reach = np.ptp(rows, axis=1)[:, None]
+    loading = found.press.loading
+    upper = loading[:, loading[1] > loading[1].max() / 2]  # the fit may leave out the touch
+    distances = [np.abs((rows - point[:, None]) / reach).max(axis=0).min() for point in upper.T]
+    assert max(distances) < 0.01
 
 
 @measured

@@ -51,10 +51,11 @@ def test_a_break_ends_the_log_and_is_said(remaining):
     assert found.working_point.stiffness.ci95[0] < K < found.working_point.stiffness.ci95[1]
 
 
-def test_a_specimen_that_breaks_for_good_was_touched():
-    """A rivet is drawn from rest until it breaks; what is left has no force."""
-    time = np.arange(0, 12, 0.02)
-    force = np.where(time < 9, 2e5 * 1e-4 * time, 0.0)
+@pytest.mark.parametrize("plastic", [0.0, 0.1, 3.0])
+def test_a_specimen_that_breaks_for_good_was_touched(plastic):
+    """A rivet is drawn from rest until it yields and breaks some seconds later; what is left has no force."""
+    time = np.arange(0, 15, 0.02)
+    force = np.where(time < 9 + plastic, 2e5 * 1e-4 * np.minimum(time, 9), 0.0)
     found = identified(time, 1e-4 * time, force)
     assert "force-drops" in found.codes
     assert abs(found.working_point.stiffness.value - 2e5) < 0.02 * 2e5

@@ -5,8 +5,10 @@ import numpy as np
 from palpate.arrays import Array, Mask
 from palpate.errors import InputError
 from palpate.identification.contacts import contacts_of
+from palpate.identification.free_motion import find_free_motion
 from palpate.identification.sampling import channels_of
 from palpate.records import Record
+from palpate.signals.samples import outer_range
 
 MIN_ROWS = 20
 """Rows for a mean that is said of a log: its standard deviation is then a fifth of a reading's, or less."""
@@ -104,67 +106,17 @@ def _position_noise(position: Array) -> float:
     return float(np.mean(np.diff(position, 3, axis=0) ** 2)) / 20.0
 
 
-_MAX_ROWS = 4000
-"""Rows that are used, evenly spaced in a longer log; more would cost time and change nothing."""
-_BEND_POSITIONS = np.linspace(0.05, 0.95, 37)
-"""Positions of a bend that are tried, as fractions of the stroke."""
-_MAX_MISFIT_RATIO = FALSE_ALARM_RATE ** (2.0 / (2 * MIN_ROWS - 3))
-"""Fraction of a straight line's misfit that a bend, one number more, leaves by chance once in a thousand logs of the
-fewest independent rows, by Fisher's distribution with 2 degrees of freedom."""
-_MAX_FLAT_SLOPE = 0.05
-"""Largest slope of the flat side, as a fraction of the slope beyond the bend: a spring
-whose force grows as the penetration to the third power shows 0.14."""
-
-
 def free_level(force: Array, position: Array) -> float | None:
-    """The force [N] of the flat side of a bend; None if there is no bend with one flat side.
+    """The force of free motion [N], at one end of the position's range; None if the log shows none.
 
     Args:
         force: along the axis in which it changes most [N], shape (n,); NaN where there is no reading.
         position: likewise [m], shape (n,).
     """
     finite = np.isfinite(force + position)
-    every = slice(None, None, max(1, int(finite.sum()) // _MAX_ROWS))
-    force = force[finite][every]
-    position = position[finite][every]
-    low = float(position.min())
-    high = float(position.max())
-    if not high > low:
-        return None
-    bends = [
-        min(
-            (_misfit_of_bend(force, side * (position - low - fraction * (high - low))), side, fraction)
-            for fraction in _BEND_POSITIONS
-        )
-        for side in (1.0, -1.0)
-    ]
-    best, opposite = sorted(bends)
-    if best[0] > _MAX_MISFIT_RATIO * min(_misfit(force, position), opposite[0]):
-        return None
-    _, side, fraction = best
-    flat = side * (position - low - fraction * (high - low)) < 0
-    return float(np.median(force[flat])) if _is_flat(force, position, flat) else None
-
-
-def _misfit_of_bend(force: Array, beyond: Array) -> float:
-    """Misfit of a force that is flat up to a position and straight beyond."""
-    return _misfit(force, np.maximum(beyond, 0.0))
-
-
-def _misfit(force: Array, regressor: Array) -> float:
-    """Sum of squares that a straight line leaves."""
-    x = regressor - regressor.mean()
-    f = force - force.mean()
-    return float(f @ f - (x @ f) ** 2 / max(float(x @ x), 1e-300))
-
-
-def _is_flat(force: Array, position: Array, flat: Mask) -> bool:
-    """True if the force does not follow the position on one side, measured by how it does on the other."""
-    rows = min(flat.sum(), (~flat).sum())
-    if rows < MIN_ROWS or not (np.ptp(position[flat]) and np.ptp(position[~flat])):
-        return False
-    slopes = [abs(float(np.polyfit(position[side], force[side], 1)[0])) for side in (flat, ~flat)]
-    return slopes[0] < _MAX_FLAT_SLOPE * slopes[1]
+    force = force[finite]
+    motion = find_free_motion(force, position[finite], outer_range(force))
+    return motion.rest if motion else None
 
 
 _GUARD_SETTLINGS = 2.0

@@ -252,10 +252,9 @@ def _free_before_touch(means: _MovingMeans) -> Mask:
     position = means.position
     later = met + max(round(0.5 / means.step), means.window)
     contact_force = means.rotations[met] @ (np.median(means.force[met:later], axis=0) - level)
-    # A tip that crosses from another touch comes down in the last part of the brief time alone.
-    spans = [brief >> halvings for halvings in range(4) if brief >> halvings >= means.window]
-    approaches = [position[end] - position[end - span] for span in spans or [brief]]
-    approach = max(approaches, key=lambda motion: _cosine(motion, contact_force))
+    approach = (
+        position[end] - position[end - means.window]
+    )  # before that, the tip may come across from another touch
     departure = position[min(met + brief, len(position) - 1)] - position[met]
     slide = position[min(later, len(position) - 1)] - position[met]
     across = contact_force - slide * (contact_force @ slide) / max(slide @ slide, 1e-300)
@@ -270,14 +269,9 @@ def _free_before_touch(means: _MovingMeans) -> Mask:
     return np.arange(len(means.rows)) < end - means.window
 
 
-def _cosine(direction: Array, force: Array) -> float:
-    """Cosine of the angle between a direction and the line of a force; 0 if one of them is 0."""
-    product = float(np.linalg.norm(direction) * np.linalg.norm(force))
-    return abs(float(direction @ force)) / max(product, 1e-300)
-
-
 def _is_along(direction: Array, force: Array) -> bool:
-    return _cosine(direction, force) > MIN_APPROACH_COSINE
+    product = float(np.linalg.norm(direction) * np.linalg.norm(force))
+    return abs(float(direction @ force)) > MIN_APPROACH_COSINE * product
 
 
 def _untouched_rows(signals: BaseSignals, means: _MovingMeans, free: Mask, weighs: bool) -> Mask:

@@ -29,6 +29,9 @@ _CAUSES = {
         "drift, friction or relaxation beside the model",
         "let the log begin and end in free motion, and press more often",
     ),
+    "time": Cause(
+        "a force that changes with time, which one press cannot tell from the surface", "press more often"
+    ),
     "loadings": Cause("differences between loadings", "press more often, at one speed", "A"),
     "friction": Cause("friction, or play before the position's sensor", "press and measure without play"),
     "ripple": Cause("the ripple of the force", "remove its cause: mains, vibration, interference"),

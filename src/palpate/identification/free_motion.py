@@ -19,12 +19,12 @@ MAX_SLOPE_RATIO = 0.4
 """Slope in free motion over that in contact, at most: a power of the depth up to n = 2 that the probe leaves with 5 %
 of its force has 0.44 there. `benchmarks/identification/free_motion_constants.py` shows which values do as well, of this
 and of the constants below."""
-_RANGE_FRACTIONS = 0.5 ** (np.arange(2, 13) / 2)
+RANGE_FRACTIONS = 0.5 ** (np.arange(2, 13) / 2)
 """Of the position's range that may lie in free motion, from a half to a sixty-fourth."""
 _MIN_FRACTION_RATIO = 2.0
 """How much farther the position must travel at one end than at the other, if the force goes with it at neither: all of
 a log in which nothing is touched is such an end, and so is a damped oscillation's turn."""
-_MIN_STAY_ROWS = 8
+MIN_STAY_ROWS = 8
 """Rows of a stay in free motion: fewer have no slope."""
 _MAX_ROWS = 1 << 16
 """Rows that are looked at; more are averaged."""
@@ -150,7 +150,7 @@ class _Search:
         the force over the whole range, and takes from the contact's.
         """
         clear = False
-        for fraction in _RANGE_FRACTIONS:
+        for fraction in RANGE_FRACTIONS:
             if (estimate := self._slope_over(direction, fraction, bound)) is None:
                 continue
             slope = float(np.sign(self.slope)) * estimate[0]
@@ -163,7 +163,7 @@ class _Search:
             estimates = (
                 self._slope_over(other_direction, other_fraction, np.inf)
                 for other_direction in (1.0, -1.0)
-                for other_fraction in _RANGE_FRACTIONS
+                for other_fraction in RANGE_FRACTIONS
             )
             steepest = (abs(k) - h for k, h in filter(None, estimates))
             if bound_below < MAX_SLOPE_RATIO * abs(self.slope) or any(
@@ -176,7 +176,7 @@ class _Search:
         """Slope over a share of the position's range from an end, and its half-width; None if none is seen."""
         key = direction, fraction, bound
         if key not in self._slopes:
-            stays = _stays_in(direction * self.position < _limit(direction * self.position, fraction))
+            _, stays = stays_at_end(direction * self.position, fraction)
             estimate = _free_slope(self.force, self.position, stays, self.white, bound) if stays else None
             self._slopes[key] = estimate
         return self._slopes[key]
@@ -188,8 +188,7 @@ def _free_motion_over(
     """Free motion over a share of the position's range; of means of so many rows of the log."""
     from scipy.special import chdtri
 
-    limit = _limit(direction * position, fraction)
-    stays = _stays_in(direction * position < limit)
+    limit, stays = stays_at_end(direction * position, fraction)
     middle = np.array([(first + last - 1) / 2 for first, last in stays]) * size + (size - 1) / 2
     rows, stay = _stay_rows(stays)
     levels = _medians(force[rows], stay)
@@ -217,9 +216,14 @@ def _contact_slope(force: Array, position: Array, ends: tuple[float, float]) -> 
     return (1.0 if rising else -1.0) * (high - low) / reach if reach > 0 else 0.0
 
 
-def _limit(position: Array, share: float) -> float:
+def stays_at_end(position: Array, fraction: float) -> tuple[float, list[tuple[int, int]]]:
+    """Limit [m] of a fraction of the position's range from its lower end, and first and past-the-last row of each stay.
+
+    The position has the shape (n,).
+    """
     bottom, top = outer_range(position)
-    return bottom + share * (top - bottom)
+    limit = bottom + fraction * (top - bottom)
+    return limit, _stays_in(position < limit)
 
 
 def _is_quiet(force: Array, position: Array, fraction: float) -> bool:
@@ -228,7 +232,8 @@ def _is_quiet(force: Array, position: Array, fraction: float) -> bool:
     Steps that a damper ends leave no slope of force over position at the deep end either.
     """
     low, high = (
-        force[direction * position <= _limit(direction * position, fraction)] for direction in (1.0, -1.0)
+        force[direction * position <= stays_at_end(direction * position, fraction)[0]]
+        for direction in (1.0, -1.0)
     )
     low_range, high_range = (float(np.ptp(outer_range(end))) for end in (low, high))
     return MAX_SLOPE_RATIO * low_range <= high_range
@@ -236,7 +241,7 @@ def _is_quiet(force: Array, position: Array, fraction: float) -> bool:
 
 def _stays_in(inside: Mask) -> list[tuple[int, int]]:
     """First and past-the-last row of each unbroken stretch that is long enough."""
-    return [(a, b) for a, b in runs(inside) if b - a >= _MIN_STAY_ROWS]
+    return [(a, b) for a, b in runs(inside) if b - a >= MIN_STAY_ROWS]
 
 
 def _stay_rows(stays: list[tuple[int, int]]) -> tuple[Indices, Indices]:
@@ -269,7 +274,7 @@ def _free_slope(
     position_change = position_change[rows] - position_change[rows].mean()
     force_change = force_change[rows] - force_change[rows].mean()
     size = float(position_change @ position_change)
-    if len(rows) < _MIN_STAY_ROWS or size <= _MIN_MOTION_POWER * len(position_change) * white**2:
+    if len(rows) < MIN_STAY_ROWS or size <= _MIN_MOTION_POWER * len(position_change) * white**2:
         return None
     slope = float(position_change @ force_change) / size
     noise = estimate_noise(force_change - slope * position_change, rows, len(stays) + 1)

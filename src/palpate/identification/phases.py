@@ -14,23 +14,20 @@ import numpy as np
 
 from palpate.arrays import Array, Indices
 from palpate.identification.causes import Code, Warn
-from palpate.identification.free_motion import find_free_motion
+from palpate.identification.free_motion import MIN_STAY_ROWS, RANGE_FRACTIONS, find_free_motion, stays_at_end
 from palpate.identification.least_squares import estimate_noise
 from palpate.identification.sampling import Channels
-from palpate.signals.samples import block_means, outer_range, robust_std, runs
+from palpate.signals.samples import block_means, outer_range, robust_std, white_noise
 
 _BLOCKS = 1000
 """Blocks of a log: a break is looked for on the scale of a thousandth of it."""
 _SIDE, _GAP = 4, 3
-"""Blocks that are averaged on either side of a break, and those between that its own duration may fill."""
-_MIN_STDS = 7.0
-"""Standard deviations of the steps of the whole log from which on a step is none of its noise."""
+"""Blocks that are averaged on either side of a break, and those between that its own duration may fill:
+`benchmarks/second_judge/judge.py --worlds fracture tap fluid_film` counts the breaks missed and invented."""
+_MIN_STDS = 5.0
+"""Standard errors that no noise reaches: once in 1.7 million, and so in one of 1700 logs of a thousand blocks."""
 _DEEP_FRACTION, _SLOW_FRACTION = 0.5, 0.1
 """Fraction of the position's range beyond which a probe is deep; of the highest speed there below which it rests."""
-_MIN_ROWS = 8
-"""Blocks that a level of the force needs."""
-_MIN_ROWS_BEFORE = 40
-"""Rows before a break that are identified."""
 
 
 class Break(NamedTuple):
@@ -64,20 +61,21 @@ def find_break(channels: Channels, tolerance: float) -> Break | None:
         return None
     force = force - float(np.median(force[:_SIDE]))
     force = force * np.sign(force[np.argmax(np.abs(force))])  # positive where the specimen is loaded
-    position = position * np.sign(np.cov(force, position)[0, 1])
+    loading = slice(0, max(int(np.argmax(force)), 1) + 1)  # afterwards a broken specimen has no force
+    position = position * np.sign(np.cov(force[loading], position[loading])[0, 1])
     speed = np.gradient(position)
     (before, after), (speed_before, speed_after) = (_sides(values) for values in (force, speed))
     lost = before - after
     slowed = np.clip(1 - speed_after / np.maximum(speed_before, 1e-300), 0.0, 1.0)
     unexplained = lost - np.maximum(slowed * before, _MIN_STDS * robust_std(lost))
     place_before, place_after = _sides(position)
-    advances = (speed_before > 0) & (speed_after > 0) & (place_after > place_before)
-    loaded = np.roll(before, _SIDE + _GAP) > before / 2  # a tap is over at once as well
-    loaded &= (before > tolerance * force.max()) & (
+    steps = np.lib.stride_tricks.sliding_window_view(np.diff(position), 2 * _SIDE + _GAP - 1)
+    returns = steps.min(axis=1) < -_MIN_STDS * white_noise(position)  # a tap is over at once as well
+    advances = (speed_before > 0) & (speed_after > 0) & (place_after > place_before) & ~returns
+    loaded = (before > tolerance * force.max()) & (
         lost < (1 + tolerance) * before
     )  # a bounce goes below none
     breaks = advances & loaded & (unexplained > 0) & (lost > tolerance * before)
-    breaks[: _MIN_ROWS_BEFORE // size + 1] = False
     if not breaks.any():
         return None
     first = int(np.argmax(breaks))
@@ -112,7 +110,7 @@ def _is_gone_at_rest(force: Array, position: Array) -> bool:
         limit = float(np.median(depth[rests]))
         advances &= depth <= limit
         rests &= depth >= limit
-    if min(map(np.count_nonzero, (advances, rests, free))) < _MIN_ROWS:
+    if min(map(np.count_nonzero, (advances, rests, free))) < MIN_STAY_ROWS:
         return False
     level = float(np.median(force[free]))
     noise = robust_std(force[free] - level)
@@ -123,14 +121,9 @@ def _is_gone_at_rest(force: Array, position: Array) -> bool:
 
 _MAX_ROWS = 1 << 13
 """Maximum rows of a fit; more are averaged."""
-_FRACTIONS = (0.5, 0.35, 0.25, 0.12, 0.06)
-"""Fractions of the position's range, from either end, in which free motion may lie."""
-_MIN_STAY_ROWS = 8
-"""Rows of a stay in free motion that is fitted."""
-_MIN_RATE_STDS = 5.0
-"""Standard errors of the rate from which on the sensor leaks: wrong once in a million."""
 _DECAY_STDS = 3.0
-"""Standard errors of a decay within the stays from which on it is seen, and to which it agrees with the leak."""
+"""Standard errors of a decay within the stays from which on it is seen, and to which it agrees with the leak: wrong
+once in 370, of a log whose leak is certain by `_MIN_STDS`."""
 
 
 @dataclass(frozen=True)
@@ -172,12 +165,9 @@ def remove_leak(channels: Channels) -> tuple[Channels, Leak | None]:
     integral: Array = np.cumsum(force - force.mean()) * size * channels.dt
     fits = []
     for direction in (1.0, -1.0):
-        low, high = outer_range(direction * position)
-        for fraction in _FRACTIONS:
-            limit = low + fraction * (high - low)
-            inside = direction * position < limit
-            stays = [slice(first, last) for first, last in runs(inside) if last - first >= _MIN_STAY_ROWS]
-            fit = _fit(force, time, integral, stays)
+        for fraction in RANGE_FRACTIONS:
+            limit, stays = stays_at_end(direction * position, fraction)
+            fit = _fit(force, time, integral, [slice(*stay) for stay in stays])
             if fit is not None:
                 without = force - fit.theta[1] * time - fit.theta[2] * integral
                 if _is_free(without, position, direction, limit):
@@ -203,7 +193,7 @@ def _fit(force: Array, time: Array, integral: Array, stays: list[slice]) -> _Lea
         max(float(other @ other), 1e-300) / max(float(residual @ residual), 1e-300)
     ) + np.log(effective)
     fit = _LeakFit(theta, cov, float(gain))
-    certain = theta[2] < -_MIN_RATE_STDS * np.sqrt(cov[2, 2])
+    certain = theta[2] < -_MIN_STDS * np.sqrt(cov[2, 2])
     return fit if certain and gain > 0 and _decays(force[rows], leak, stays, fit) else None
 
 

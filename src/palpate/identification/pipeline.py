@@ -37,12 +37,14 @@ class _PreparedLog:
         chain: the filter of both.
         options: as given.
         units: of the record's columns, by name.
+        fluid: what is touched flows.
     """
 
     channels: Channels
     chain: Chain
     options: Options
     units: Units
+    fluid: bool
 
     @property
     def impedance_units(self) -> dict[str, str]:
@@ -66,11 +68,11 @@ def identify(record: Record, **given: Any) -> Identification:
     """
     options = Options.of(**given)
     units = record.units
-    channels = _until_break(record, options)
+    channels, fluid = _until_break(record, options)
     options.check_lag(len(channels.position) * channels.dt)
     channels = thinned(channels, -(-len(channels.position) // _MAX_SAMPLES))
     channels, chain, contacts = contacts_of(channels, options)
-    log = _PreparedLog(channels, chain, options, units)
+    log = _PreparedLog(channels, chain, options, units, fluid)
     warnings = (*channels.warnings, *contacts.warnings)
     if not contacts.spans:
         return _no_contact(log, warnings)
@@ -86,15 +88,19 @@ def identify(record: Record, **given: Any) -> Identification:
     return _outcome(log, choice, warnings)
 
 
-def _until_break(record: Record, options: Options) -> Channels:
-    """The channels up to the first break of the specimen, with a warning; all of them without one, or of a fluid."""
+def _until_break(record: Record, options: Options) -> tuple[Channels, bool]:
+    """The channels up to the first break of the specimen, with a warning, and whether a fluid is touched.
+
+    All of them without a break, or of a fluid.
+    """
     channels = channels_of(record)
-    first = find_break(channels, options.tolerance)
-    if first is None or flows(channels):
-        return channels
+    fluid = flows(channels)
+    first = None if fluid else find_break(channels, options.tolerance)
+    if first is None:
+        return channels, fluid
     before = record["time"] < first.time
     channels = channels_of(replace(record, columns={name: record[name][before] for name in record.columns}))
-    return replace(channels, warnings=(*channels.warnings, Warn(Code.FORCE_DROPS, first.text)))
+    return replace(channels, warnings=(*channels.warnings, Warn(Code.FORCE_DROPS, first.text))), False
 
 
 _MIN_STIFFNESS, _MAX_STIFFNESS = 1.0, 1e8
@@ -117,7 +123,7 @@ def _outcome(log: _PreparedLog, choice: Choice, warnings: tuple[Warn, ...]) -> I
         press = replace(press, pull_off=_pull_off(log.channels, problem.contacts))
     choice = _surface_alone(choice, options)
     parameters, parameter_warnings = verdicts(choice, point, options, log.units)
-    if flows(log.channels):
+    if log.fluid:
         point, press, parameter_warnings = None, None, (Warn(Code.FORCE_FLOWS, _FLOWS),)
         parameters |= {"K": parameters["K"].without_number(_FLOWS)}
     warnings = (*warnings, *parameter_warnings)
@@ -318,14 +324,20 @@ def _traces(log: _PreparedLog, choice: Choice | None) -> Traces:
     size = max(len(problem.force) // _MAX_TRACE_SAMPLES, 1)
     linear = fitted.model.linear
     mass = problem.lag.mass
-    columns = fitted.model.columns(problem.motion, fitted.theta, fitted.lag)
+    motion = problem.motion
+    columns = fitted.model.columns(motion, fitted.theta, fitted.lag)
+    # As the press and the working point: the depth from where contact is seen, the force from where it rests.
+    position = motion.position[0] + (0.0 if motion.free is None else motion.free[0])
+    surface = float(choice.problem.motion.position[0] - position)
+    rest = problem.contacts.resting
+    rows_rest = 0.0 if problem.counted else rest
     return Traces(
         time,
-        chain(problem.contacts.force_sign * channels.force)[::stride] - problem.resting,
+        chain(problem.contacts.force_sign * channels.force)[::stride] - rest,
         block_means(channels.start + problem.time, size),
-        block_means(problem.motion.moved(0, fitted.lag), size),
-        block_means(problem.force, size),
-        block_means(fitted.force, size),
+        block_means(motion.moved(0, fitted.lag) + surface, size),
+        block_means(problem.force - rows_rest, size),
+        block_means(fitted.force - rows_rest, size),
         {name: block_means(c, size) for name, c in zip(linear, columns, strict=True)},
         {name: fitted[name] for name in linear},
         {"M": mass[1]} if mass and "M" in linear else {},

@@ -29,7 +29,7 @@ from palpate.identification.spectrum import (
     storage_near,
     working_point,
 )
-from palpate.identification.steady_press import HALF_WINDOW, Slopes, SteadyPress, thin_curve
+from palpate.identification.steady_press import HALF_WINDOW, WINDOW, Slopes, SteadyPress, thin_curve
 from palpate.identification.uncertainty import Contribution, Measurement, half_width
 from palpate.signals.samples import runs
 
@@ -75,12 +75,14 @@ def relaxation(problem: Problem, slope: Slopes | None) -> Relaxation | None:
 _MIN_TURN_ROWS = 6
 
 
-def _find_unloading(problem: Problem) -> tuple[Array, float | None, tuple[float, float] | None]:
+def _find_unloading(
+    problem: Problem, drawn_lag: float
+) -> tuple[Array, float | None, tuple[float, float] | None]:
     """The unloadings of a log, with the lag of the force removed.
 
     Returns:
-        Depth [m] and force [N] of the deepest contact's unloading, shape (2, n), empty if there is none; its fraction
-        of lost work, and the lateness of the force, both as in `Press`.
+        Depth [m] and force [N] of the deepest contact's unloading by the lag that is drawn [s], shape (2, n), empty if
+        there is none; its fraction of lost work, and the lateness of the force, both as in `Press`.
     """
     motion = problem.motion
     lag = problem.lag.value
@@ -99,7 +101,7 @@ def _find_unloading(problem: Problem) -> tuple[Array, float | None, tuple[float,
     contacts = [(depth[rows], speed[rows], force[rows], time[rows]) for rows in unloaded]
     work_in, work_out = _works(contact_depth, contact_force)
     loss = 1 - work_out / work_in if work_in > 0 else None
-    unloading = np.stack([contact_depth[turn:], contact_force[turn:]])
+    unloading = np.stack([motion.moved(0, drawn_lag)[deepest.rows][turn:], contact_force[turn:]])
     return unloading, loss, _lateness(contacts)
 
 
@@ -160,11 +162,13 @@ def find_press(problem: Problem, answer: FittedParameters | None) -> Press | Non
     loadings = loadings_in(problem, problem.lag.value)
     if not loadings:
         return None
-    loading = max(loadings, key=lambda loading: len(loading.depth))
+    lag = problem.lag.value if answer is None else answer.fit.lag
+    drawn = loadings_in(problem, lag) or loadings
+    loading = max(drawn, key=lambda loading: len(loading.depth))
     later = loadings_read_later(problem, loadings)
-    unloading, loss, lateness = _find_unloading(problem)
+    unloading, loss, lateness = _find_unloading(problem, lag)
     return Press(
-        _find_tangents(problem, answer),
+        _find_tangents(problem, answer, lag),
         thin_curve(np.stack([loading.depth, loading.force])),
         thin_curve(unloading),
         loss,
@@ -173,12 +177,11 @@ def find_press(problem: Problem, answer: FittedParameters | None) -> Press | Non
     )
 
 
-def _find_tangents(problem: Problem, answer: FittedParameters | None) -> tuple[Tangent, ...]:
+def _find_tangents(problem: Problem, answer: FittedParameters | None, lag: float) -> tuple[Tangent, ...]:
     """Tangents at fractions of the force, if known to their own size.
 
     A lag T looks like a damping of -K T, so the answer's damping needs the answer's lag.
     """
-    lag = problem.lag.value if answer is None else answer.fit.lag
     loadings = loadings_in(problem, lag)
     low, high = np.percentile(problem.force[problem.inside], [2, 98])
     tangents = []
@@ -273,7 +276,8 @@ def _among_loadings(headline: Slopes, problem: Problem) -> Slopes:
     """A tangent of strokes at constant speed, with its difference from the log's other loadings as a cause.
 
     The square of the difference, less those of the half-widths, is the variance between the two (Paule and Mandel,
-    1982): a stroke may be the second on a surface that has yielded.
+    1982): a stroke may be the second on a surface that has yielded. Loadings that end below the tangent's force are
+    compared at a force that all reach, and the relative scatter there counts.
     """
     lag = problem.lag.value
     loadings = loadings_in(problem, lag)
@@ -290,7 +294,14 @@ def _among_loadings(headline: Slopes, problem: Problem) -> Slopes:
     difference = tangent.value - stiffness.value
     excess = max(difference**2 - tangent.half**2 - stiffness.half**2, 0.0)
     scatter = Contribution.within(float(np.sqrt(excess)))
-    return replace(headline, stiffness=stiffness.with_cause("loadings", scatter))
+    lowest = min(float(loading.force.max()) for loading in loadings)
+    if lowest < headline.force + resting:
+        level = low + float(np.mean(WINDOW)) * (lowest - low)
+        shared = tangent_at(problem, lag, loadings, level, within, None)
+        if shared is not None and "repetition" in shared.contributions:
+            relative = shared.contributions["repetition"].times(stiffness.value / shared.value)
+            scatter = max(scatter, relative, key=lambda contribution: contribution.half)
+    return headline.with_cause("loadings", scatter)
 
 
 def stiffness_at_point(problem: Problem, force: Array, point: WorkingPoint) -> float | None:

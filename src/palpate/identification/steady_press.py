@@ -28,7 +28,7 @@ from palpate.identification.pooling import random_effects
 from palpate.identification.sampling import Channels
 from palpate.identification.strokes import MAX_BLOCKS, MIN_STROKE_REACH, Stroke, find_turns
 from palpate.identification.uncertainty import Contribution, Measurement
-from palpate.signals.samples import block_means
+from palpate.signals.samples import block_means, white_noise
 from palpate.signals.types import NORMAL
 
 WINDOW = (0.35, 0.97)
@@ -100,12 +100,27 @@ class Curve:
         reach = (high - low) / 2
         return (self.depth - middle) / reach, middle, reach
 
+    def crossings(self, low: float, high: float) -> tuple[int, int]:
+        """First row above each of two forces, counted in the direction of loading; the length if none is."""
+        force = self.force if self.loads else self.force[::-1]
+        above = np.flatnonzero(force > high)
+        return int(np.argmax(force > low)), int(above[0]) if len(above) else len(force)
+
+    def secant(self, low: float, high: float) -> float:
+        """Mean slope between the crossings of two forces [N/m], interpolated between rows."""
+        step = 1 if self.loads else -1
+        depth, force = self.depth[::step], self.force[::step]
+        ends = np.clip(self.crossings(low, high), 1, len(force) - 1).tolist()
+        begin, end = (
+            float(np.interp(level, force[row - 1 : row + 1], depth[row - 1 : row + 1]))
+            for level, row in zip((low, high), ends, strict=True)
+        )
+        return (high - low) / (end - begin or np.inf)
+
     def between(self, low: float, high: float) -> Curve | None:
         """Block means of the unbroken part between the crossings of two forces; None if there are too few."""
-        force = self.force if self.loads else self.force[::-1]
-        first = int(np.argmax(force > low))
-        above = np.flatnonzero(force > high)
-        last = int(above[0]) if len(above) else len(force)
+        force = self.force
+        first, last = self.crossings(low, high)
         readings = int((last - first) * self.readings)  # rows between two readings add no information
         count = min(_MAX_BLOCKS, readings)
         if count < _MIN_BLOCKS:
@@ -213,6 +228,10 @@ class Slopes:
     again: float | None
     rise: float
 
+    def with_cause(self, cause: str, contribution: Contribution) -> Slopes:
+        """Add one more cause of error to the stiffness."""
+        return replace(self, stiffness=self.stiffness.with_cause(cause, contribution))
+
     def spread_as(self, wider: Slopes | None) -> Slopes:
         """Take over the relative spread of more presses, if it is larger, as of one on another surface."""
         if wider is None or not wider.stiffness.value:
@@ -221,8 +240,7 @@ class Slopes:
         spread = wider.stiffness.contributions["repetition"].times(gain)
         if spread.half <= self.stiffness.contributions["repetition"].half:
             return self
-        stiffness = self.stiffness.with_cause("repetition", spread)
-        return replace(self, stiffness=stiffness, each=wider.each, again=None)
+        return replace(self.with_cause("repetition", spread), each=wider.each, again=None)
 
 
 def slopes_at(
@@ -237,7 +255,8 @@ def slopes_at(
     low = max(curve.reach[0] for curve in curves)
     high = min(curve.reach[1] for curve in curves)
     begin, end = (low + share * (high - low) for share in shares)
-    windows = [window for curve in curves if (window := curve.between(begin, end)) is not None]
+    passes = [(curve, curve.between(begin, end)) for curve in curves]
+    windows = [window for _, window in passes if window is not None]
     if not windows or high <= low:
         return None
     level = float(np.mean([chebyshev.chebval(0.0, window.fit(2)) for window in windows]))
@@ -252,6 +271,12 @@ def slopes_at(
     shrinkage = np.maximum(1 - noises / np.maximum(differences**2, 1e-300), 0.0)
     slopes = slopes + shrinkage * differences
     bias_variances = shrinkage * noises
+    brief, errors = _brief_slopes(passes, begin, end, float(slopes.mean()))
+    slopes, variances = np.r_[slopes, brief], np.r_[variances, errors]
+    rows = np.r_[np.arange(len(windows)), np.zeros(len(brief), np.intp)]
+    bends, drifts, depths, bias_variances = (
+        values[rows] for values in (bends, drifts, depths, bias_variances)
+    )
     mean = random_effects(slopes, variances + bias_variances)
     n = len(slopes)
     weight = 1 / np.maximum(variances + mean.between**2, 1e-300)
@@ -275,6 +300,50 @@ def slopes_at(
     depth = float(weight @ depths)
     stiffness = Measurement(value, parts)
     return Slopes(level - rest, depth, stiffness, tuple(slopes.tolist()), mean.next_half, rise)
+
+
+def _brief_slopes(
+    passes: Sequence[tuple[Curve, Curve | None]], begin: float, end: float, slope: float
+) -> tuple[Array, Array]:
+    """Slopes [N/m] and their variances of strokes that pass a window of the force [N] too fast for a curve, shape (k,).
+
+    Each has a secant, and so have the others, whose mean slope is given: a stiffer surface is passed in fewer rows, and
+    must not be left out for that.
+    """
+    usual = np.mean([curve.secant(begin, end) for curve, window in passes if window is not None])
+    brief = [curve for curve, window in passes if window is None]
+    slopes = np.array([curve.secant(begin, end) for curve in brief]) * slope / usual
+    noise = np.array([white_noise(curve.force) for curve in brief])
+    return slopes, 2 * (slopes * noise / (end - begin)) ** 2
+
+
+_WINDOWS = (WINDOW, *((level - HALF_WINDOW, min(level + HALF_WINDOW, 1.0)) for level in LEVELS))
+"""Windows of the headline and of the further tangents, as fractions of the force."""
+
+
+def change_with_time(loading: Curve, back: Curve) -> float:
+    """Standard deviation of the tangents of one press by a force that changes meanwhile [N/m].
+
+    A surface makes the difference between loading and return 0, or, if it relaxes, a smooth function of the force. How
+    the differences scatter about a parabola over the force, beyond their noise, is no surface's. Noise alone would be
+    taken for it in one of twenty logs: the scatter is 0 below the 95 % quantile of chi squared.
+    """
+    from scipy.special import chdtri
+
+    low, high = max(loading.reach[0], back.reach[0]), min(loading.reach[1], back.reach[1])
+    powers, difference, variance = [], [], []
+    for window in _WINDOWS:
+        begin, end = (low + share * (high - low) for share in window)
+        halves = [curve.between(begin, end) for curve in (loading, back)]
+        tangents = [half.tangent((begin + end) / 2) for half in halves if half is not None]
+        if len(tangents) < len(halves):
+            return 0.0
+        powers.append([sum(window), sum(window) ** 2])
+        difference.append(tangents[1].slope - tangents[0].slope)
+        variance.append(tangents[1].variance + tangents[0].variance)
+    freedom = len(_WINDOWS) - 3
+    variances = np.array(variance) * chdtri(freedom, 0.05) / freedom
+    return random_effects(np.array(difference), variances, np.array(powers)).between
 
 
 @dataclass(frozen=True)
@@ -328,8 +397,12 @@ def steady_press(
         headline = headline.spread_as(slopes_at(similar, WINDOW, lag, rest))
     if not headline.stiffness.with_cause("repetition", Contribution(0.0)).known_to(1.0):
         return None
-    windows = [(level - HALF_WINDOW, min(level + HALF_WINDOW, 1.0)) for level in LEVELS]
-    others = [slopes_at(loadings, window, lag, rest) for window in windows]
+    others = [slopes_at(loadings, window, lag, rest) for window in _WINDOWS[1:]]
+    returns = [curve for curve in curves if curve.loads is not loadings[0].loads]
+    if len(loadings) == 1 and returns:
+        change = Contribution(change_with_time(loadings[0], returns[0]))
+        headline = headline.with_cause("time", change)
+        others = [slopes and slopes.with_cause("time", change) for slopes in others]
     known = tuple(slopes for slopes in others if slopes and slopes.stiffness.known_to(1.0))
     drawn_curves = []
     for loads in (True, False):
