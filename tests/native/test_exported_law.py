@@ -147,7 +147,7 @@ def test_a_certificate_knows_the_header_of_its_gains(force, gains, tmp_path, cap
     code, says = answer(msgspec.structs.replace(own, cap=0.9 * own.cap))
     assert (code, says.count("\n")) == (2, 1)
     assert "other gains" in says
-    header.write_text(force.sources.header.replace(f"law: {own.law}", "law: cautious adaptive control 6"))
+    header.write_text(force.sources.header.replace(f"law: {own.law}", "law: cautious adaptive control 7"))
     assert "another law" in answer(own)[1]
     header.write_text("int main(void);")
     assert "no header" in answer(own)[1]

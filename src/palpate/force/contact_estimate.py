@@ -153,9 +153,6 @@ def next_estimate(law, estimate, state, stage, w, f, force):
         )
     rate = (f.y - f.y0) / law.tick
     phi = regressor(law, estimate, f, rate)
-    if state.bound.sure.refuted > 0.0:  # it was no surface: what it seemed to tell is forgotten
-        nothing = fit_through(law.cap * (f.y - estimate.origin), w.mean, UNKNOWN)
-        return ContactEstimate(nothing, nothing, law.blind / law.tick, estimate.origin, 0.0, ZERO3, ZERO3)
     if (
         state.bound.used >= law.cap
         and estimate.std.z > 0.0

@@ -208,7 +208,7 @@ def next_watch(law, state, starts, force):
     many = w.fresh + 1.0 if fresh else w.fresh
     span = min(state.ticks * law.tick, 3.0)
     if fresh:
-        if state.bound.sure.stiffness == 0.0:
+        if state.bound.confirmed == 0.0:
             # A second difference: neither bias nor drift nor a touch is noise.
             bend = force - 2.0 * w.last + w.former
             variance += (min(bend * bend / 6.0, 9.0 * variance) - variance) / (FEWEST + span / law.period)
@@ -252,7 +252,7 @@ def steepest_of(law, state, force):
     if state.ticks % span != 0.0:
         return Steepest(total, s.last, s.former, rise)
     mean = total / span
-    if state.bound.sure.stiffness == 0.0:
+    if state.bound.confirmed == 0.0:
         rise = max(rise, mean - s.former)
     return Steepest(0.0, mean, s.last, rise)
 

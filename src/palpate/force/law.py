@@ -28,7 +28,7 @@ from palpate.force.contact_evidence import (
 )
 from palpate.force.outlier import REFUTED, Knowledge, Recall, next_recall
 from palpate.force.stage import MOST, STEP, Backstop, Stage, is_false_touch, next_backstop, next_stage
-from palpate.force.stiffness_bound import EARNED, Bound, Sure, next_bound
+from palpate.force.stiffness_bound import Bound, next_bound
 
 SMOOTHING = 0.1
 """Of a servo's lag in free motion, by which its lead is smoothed: the usual filter of a PID controller's derivative,
@@ -111,7 +111,7 @@ class Cautious(NamedTuple):
             Stage(FREE_MOTION, 0.0, 0.0, 0.0),
             ContactEstimate(fit, fit, 0.0, 0.0, 0.0, ZERO3, ZERO3),
         )
-        bound = Bound(self.cap, self.cap, self.cap, 0.0, 0.0, Sure(0.0, 0.0, 0.0, self.approach, 0.0, 0.0))
+        bound = Bound(self.cap, self.cap, self.cap, 0.0, 0.0, 0.0, 0.0, 0.0)
         backstop = Backstop(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         recall = Recall(0.0, Knowledge(watch, stage, estimate, bound, backstop))
         follow = Follow(ZERO3, 0.0, 0.0, 0.0, 0.0)
@@ -142,12 +142,11 @@ class Cautious(NamedTuple):
         forward = 0.0
         if stage.phase != FREE_MOTION and abs(desired - before) <= STEP * abs(desired):
             forward = (desired - before) / self.tick * (self.compliance + 1.0 / bound.used)
-        limit = bound.sure.limit
+        limit = self.speed if bound.confirmed > 0.0 else self.approach
         speed = max(min(u + forward, limit), -limit)
         if stage.phase == FREE_MOTION:
             speed = backstop.care * self.approach if backstop.bounces < MOST else 0.0
-        most = self.speed if limit > EARNED * self.approach else limit
-        speed, pace = lead_speed(self, state.pace, speed, bound.used, most)
+        speed, pace = lead_speed(self, state.pace, speed, bound.used, limit)
         return speed, CautiousState(
             state.ticks + 1.0, desired, watch, follow, stage, estimate, starts, bound, backstop, pace, recall
         )  # fmt: skip
@@ -199,9 +198,7 @@ def lead_speed(law, pace, speed, bound, limit):
 
     A tip that a servo pulls against a surface of stiffness K is late by the slowest time constant of
     m s^2 + D s + K_s + K. The command is ahead by that. What the limit takes off is taken off the smoothed speed, so
-    that it stays the speed that the tip can have. The speed that a test has borne out is the tip's: the command is
-    then ahead of it by up to the arm's own limit. Before, a tip that gathers speed slowly touches gently where a sensor
-    lied: measured by benchmarks/force/free_motion.py.
+    that it stays the speed that the tip can have.
     """
     if law.lead == 0.0:
         return speed, speed

@@ -56,7 +56,7 @@ def is_false_touch(law, state, w):
 def follows_no_tip(law, state):
     """Whether the force of a touch neither rises nor falls with the tip by as much as the softest surface's would."""
     estimate = state.estimate
-    if estimate.std.x == 0.0 or state.stage.phase == FREE_MOTION or state.bound.sure.stiffness > 0.0:
+    if estimate.std.x == 0.0 or state.stage.phase == FREE_MOTION or state.bound.confirmed > 0.0:
         return False
     return (abs(estimate.value.x) + PLAIN * estimate.std.x) * law.cap * law.approach < law.drift
 
