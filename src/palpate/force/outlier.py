@@ -64,10 +64,10 @@ def next_recall(law, state, follow, force):
     """
     readings, known = state.recall
     if readings <= 0.0:
-        readings, known = (
-            0.0,
-            Knowledge(state.watch, state.stage, state.estimate, state.bound, state.backstop),
-        )
+        readings = 0.0
+        known = Knowledge(
+            watch=state.watch, stage=state.stage, estimate=state.estimate, bound=state.bound, backstop=state.backstop
+        )  # fmt: skip
     if state.stage.phase != LOCKED:
         return Recall(0.0, known)
     if is_fresh(law, state.watch, force):

@@ -55,29 +55,34 @@ def next_bound(law, bound, stage, estimate, w, f):
     Locked, it rises at once where the last theta alone is by `z` standard deviations for a stiffer surface. Noise is so
     too, now and then: the rise is taken back unless the readings bear it out, so that it adds up to nothing.
     """
-    used, held, most, least, calm, confirmed, trail, stroke = bound
+    used, held, most, least = bound.used, bound.held, bound.most, bound.least
+    calm, confirmed, trail, stroke = bound.calm, bound.confirmed, bound.trail, bound.stroke
     if confirmed == 0.0:
         trail += 2.0 * law.tick / law.theta * (f.y - trail)
     if stage.phase == FREE_MOTION:
-        return Bound(most, most, most, 0.0, 0.0, 0.0, trail, f.y - trail)
-    if estimate.since * law.tick < law.blind or stage.since * law.tick < SURE * law.period:
-        return Bound(used, held, most, least, calm, confirmed, trail, stroke)
-    p, alone, both = estimate.fast.solution(), estimate.fast.std(AXIS_K), estimate.fast.std(BOTH)
-    most = max(most, (1.0 + law.eps) * highest(law, p, -SHOWN * alone, -SHOWN * both))
-    upper = min((1.0 + law.eps) * highest(law, p, law.z * alone, law.z * both), most)
-    if stage.phase != LOCKED:
-        if confirmed == 0.0 and not is_surface(law, estimate, w, f.y - trail, stroke):
-            return Bound(most, most, most, least, 0.0, 0.0, trail, stroke)
-        now = max(from_slow(law, estimate, most), least)
-        now = upper if highest(law, p, -alone, -both) > now else now
-        return Bound(now, now, most, least, 0.0, 1.0, trail, stroke)
-    if highest(law, p, -SHOWN * alone, -SHOWN * both) > STIFFER * held:
-        held = upper
-    suspected = highest(law, p, -law.z * alone, -law.z * both)
-    calm = 0.0 if suspected > STIFFER * held else calm + 1.0
-    used = used if calm * law.tick < AGAIN * law.theta else held
-    used = upper if suspected > STIFFER * used else max(used, held)
-    return Bound(used, held, most, 0.5 * held, calm, confirmed, trail, stroke)
+        used, held, least, calm, confirmed, stroke = most, most, 0.0, 0.0, 0.0, f.y - trail
+    elif estimate.since * law.tick >= law.blind and stage.since * law.tick >= SURE * law.period:
+        p, alone, both = estimate.fast.solution(), estimate.fast.std(AXIS_K), estimate.fast.std(BOTH)
+        most = max(most, (1.0 + law.eps) * highest(law, p, -SHOWN * alone, -SHOWN * both))
+        upper = min((1.0 + law.eps) * highest(law, p, law.z * alone, law.z * both), most)
+        if stage.phase == LOCKED:
+            if highest(law, p, -SHOWN * alone, -SHOWN * both) > STIFFER * held:
+                held = upper
+            suspected = highest(law, p, -law.z * alone, -law.z * both)
+            calm = 0.0 if suspected > STIFFER * held else calm + 1.0
+            used = used if calm * law.tick < AGAIN * law.theta else held
+            used = upper if suspected > STIFFER * used else max(used, held)
+            least = 0.5 * held
+        else:
+            used = most
+            if confirmed > 0.0 or is_surface(law, estimate, w, f.y - trail, stroke):
+                confirmed = 1.0
+                used = max(from_slow(law, estimate, most), least)
+                used = upper if highest(law, p, -alone, -both) > used else used
+            held, calm = used, 0.0
+    return Bound(
+        used=used, held=held, most=most, least=least, calm=calm, confirmed=confirmed, trail=trail, stroke=stroke
+    )  # fmt: skip
 
 
 @law
@@ -97,7 +102,8 @@ def is_surface(law, estimate, w, moved, stroke):
     level = max(law.level, EDGE * sqrt(w.variance))
     if w.fresh <= FEWEST or w.mean - w.rest <= level:
         return False
-    if law.lead > 0.0 and moved < STOPPED * 0.5 * law.theta * law.approach < stroke:
+    slow = STOPPED * 0.5 * law.theta * law.approach
+    if law.lead > 0.0 and moved < slow < stroke:
         return True
     shown = w.mean - w.rest > SHOWED * w.steepest.rise and w.slow - w.rest > SHOWED * w.peak
     return shown and (estimate.value.x - EDGE * estimate.std.x) * law.cap * law.approach > law.drift
