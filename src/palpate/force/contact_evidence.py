@@ -142,7 +142,7 @@ class Steepest(NamedTuple):
 
 
 @part
-class Watch(NamedTuple):
+class ContactDetectorState(NamedTuple):
     """The force's readings and their noise."""
 
     last: float
@@ -195,10 +195,10 @@ def next_watch(law, state, starts, force):
     w = state.watch
     if state.ticks < 1.0:
         period = law.period / law.tick
-        return Watch(
+        return ContactDetectorState(
             last=force, former=force, mean=force, slow=w.rest, slower=force, rest=w.rest, drift=w.drift, peak=w.peak,
             variance=w.variance, slow_variance=w.slow_variance, evidence=0.0, fresh=w.fresh + 1.0, age=0.0, gap=period,
-            steepest=Steepest(0.0, force, force, w.steepest.rise),
+            steepest=Steepest(total=0.0, last=force, former=force, rise=w.steepest.rise),
         )  # fmt: skip
     fresh, steepest = is_fresh(law, w, force), steepest_of(law, state, force)
     mean = w.mean + law.tick / (0.004 + law.tick) * (force - w.mean)
@@ -226,7 +226,7 @@ def next_watch(law, state, starts, force):
             rest = max(min(rest, law.bias), -law.bias)
         drift += law.tick / MEMORY * ((rest - w.rest) / law.tick - drift)
         peak = min(max((1.0 - law.tick / FADING) * peak, abs(slow - rest)), law.bias)
-    return Watch(
+    return ContactDetectorState(
         last=force, former=former, mean=mean, slow=slow, slower=slower, rest=rest, drift=drift, peak=peak,
         variance=variance, slow_variance=max(slow_variance, white(law, variance)), evidence=evidence, fresh=many,
         age=age, gap=gap, steepest=steepest,
@@ -244,11 +244,11 @@ def steepest_of(law, state, force):
     fading = 1.0 - law.tick / MEMORY if state.stage.phase == FREE_MOTION else 1.0
     total, rise = s.total + force, fading * s.rise
     if state.ticks % span != 0.0:
-        return Steepest(total, s.last, s.former, rise)
+        return Steepest(total=total, last=s.last, former=s.former, rise=rise)
     mean = total / span
     if state.bound.confirmed == 0.0:
         rise = max(rise, mean - s.former)
-    return Steepest(0.0, mean, s.last, rise)
+    return Steepest(total=0.0, last=mean, former=s.last, rise=rise)
 
 
 @law
@@ -262,7 +262,7 @@ def tare(law, w):
     """The bias after a false touch: the mean over theta, which is within what a sensor may be off."""
     peak = min(max(w.peak, abs(w.slow - w.rest)), law.bias)
     drift = w.drift + (w.slow - w.rest) / MEMORY
-    return Watch(
+    return ContactDetectorState(
         last=w.last, former=w.former, mean=w.mean, slow=w.slow, slower=w.slow, rest=w.slow, drift=drift, peak=peak,
         variance=w.variance, slow_variance=w.slow_variance, evidence=0.0, fresh=w.fresh, age=w.age, gap=w.gap,
         steepest=w.steepest,

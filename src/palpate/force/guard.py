@@ -8,9 +8,9 @@ from palpate._jit import law, part, reader, writer
 from palpate._jit.overloads import leaves, places
 from palpate.arrays import Array
 from palpate.force.contact_estimate import ContactEstimate
-from palpate.force.contact_evidence import FREE_MOTION, MEMORY, Watch, behind
+from palpate.force.contact_evidence import FREE_MOTION, MEMORY, ContactDetectorState, behind
 from palpate.force.law import Cautious, CautiousState
-from palpate.force.stage import LEARNING, LOCKED, MOST, follows_no_tip
+from palpate.force.stage import LEARNING, LOCKED, MAX_BOUNCES, follows_no_tip
 from palpate.force.stiffness_bound import STIFFER
 
 FINE, BLIND, STALE, SATURATED, LIMITED, LATE, UNREACHED, PULLED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
@@ -151,13 +151,13 @@ def allowed_speed(law, guard, after, desired, force, speed):
         return 0.0, STALE
     if guard.vain > FARTHEST * desired:
         return 0.0, UNREACHED
-    if after.backstop.bounces >= MOST and after.stage.phase == FREE_MOTION:
+    if after.backstop.bounces >= MAX_BOUNCES and after.stage.phase == FREE_MOTION:
         return 0.0, BOUNCED
     if follows_no_tip(law, after) and abs(after.watch.slow) >= law.bias:
         return 0.0, UNTARED
     if after.bound.most > STIFFER * law.cap and guard.trouble == FINE:
         return speed, BEYOND
-    if guard.losses >= MOST and after.stage.phase == LEARNING and guard.trouble == FINE:
+    if guard.losses >= MAX_BOUNCES and after.stage.phase == LEARNING and guard.trouble == FINE:
         return speed, SWINGS
     drifts = MEMORY * abs(after.watch.drift) > SEEN * (after.watch.variance / behind(law, after)) ** 0.5
     return (
@@ -205,7 +205,7 @@ def in_vain(law, guard, after, desired, speed):
 def restart(law, state):
     """Free motion, of which only the sensor's noise and bias are known."""
     s, w = law.start(), state.watch
-    watch = Watch(
+    watch = ContactDetectorState(
         last=0.0, former=0.0, mean=0.0, slow=w.rest, slower=w.rest, rest=w.rest, drift=w.drift, peak=w.peak,
         variance=w.variance, slow_variance=w.slow_variance, evidence=0.0, fresh=w.fresh, age=0.0,
         gap=law.period / law.tick, steepest=w.steepest,

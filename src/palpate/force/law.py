@@ -17,9 +17,9 @@ from palpate.force.contact_estimate import NOTHING, ContactEstimate, Fit, first_
 from palpate.force.contact_evidence import (
     FREE_MOTION,
     NO_STARTS,
+    ContactDetectorState,
     Starts,
     Steepest,
-    Watch,
     behind,
     next_starts,
     next_watch,
@@ -28,10 +28,10 @@ from palpate.force.contact_evidence import (
 )
 from palpate.force.outlier import REFUTED, Knowledge, Recall, next_recall
 from palpate.force.stage import (
-    MOST,
+    MAX_BOUNCES,
     STEP,
     Backstop,
-    Stage,
+    PressPhase,
     is_false_touch,
     next_backstop,
     next_stage,
@@ -112,12 +112,12 @@ class Cautious(NamedTuple):
     def start(self):
         """Free motion, with no estimate of a surface."""
         fit, variance = Fit(NOTHING, ZERO3), max(self.noise * self.noise, self.least)
-        slow_variance, steepest = white(self, variance), Steepest(0.0, 0.0, 0.0, 0.0)
-        watch = Watch(
+        slow_variance, steepest = white(self, variance), Steepest(total=0.0, last=0.0, former=0.0, rise=0.0)
+        watch = ContactDetectorState(
             last=0.0, former=0.0, mean=0.0, slow=0.0, slower=0.0, rest=0.0, drift=0.0, peak=0.0, variance=variance,
             slow_variance=slow_variance, evidence=0.0, fresh=0.0, age=0.0, gap=0.0, steepest=steepest,
         )  # fmt: skip
-        stage = Stage(phase=FREE_MOTION, since=0.0, quiet=0.0, firm=0.0)
+        stage = PressPhase(phase=FREE_MOTION, since=0.0, quiet=0.0, firm=0.0)
         estimate = ContactEstimate(
             slow=fit, fast=fit, since=0.0, origin=0.0, shown=0.0, value=ZERO3, std=ZERO3
         )
@@ -158,7 +158,7 @@ class Cautious(NamedTuple):
         limit = self.speed if bound.confirmed > 0.0 else self.approach
         speed = max(min(u + forward, limit), -limit)
         if stage.phase == FREE_MOTION:
-            speed = backstop.care * self.approach if backstop.bounces < MOST else 0.0
+            speed = backstop.care * self.approach if backstop.bounces < MAX_BOUNCES else 0.0
         speed, pace = lead_speed(self, state.pace, speed, bound.used, limit)
         return speed, CautiousState(
             ticks=state.ticks + 1.0, desired=desired, watch=watch, follow=follow, stage=stage, estimate=estimate,
@@ -185,9 +185,9 @@ class Follow(NamedTuple):
 class CautiousState(NamedTuple):
     ticks: float
     desired: float
-    watch: Watch
+    watch: ContactDetectorState
     follow: Follow
-    stage: Stage
+    stage: PressPhase
     estimate: ContactEstimate
     starts: Starts
     bound: Bound

@@ -17,7 +17,7 @@ STEP = 0.02
 
 
 @part
-class Stage(NamedTuple):
+class PressPhase(NamedTuple):
     """Phase of a press, and how long it has lasted."""
 
     phase: float
@@ -46,7 +46,7 @@ def next_stage(law, state, w, desired, before, false_touch):
         since = 0.0
     if phase != stage.phase or phase == FREE_MOTION:
         quiet = 0.0
-    return Stage(phase=phase, since=since, quiet=quiet, firm=firm)
+    return PressPhase(phase=phase, since=since, quiet=quiet, firm=firm)
 
 
 @law
@@ -64,9 +64,9 @@ def follows_no_tip(law, state):
     return (abs(estimate.value.x) + PLAIN * estimate.std.x) * law.cap * law.approach < law.drift
 
 
-MOST = 3.0
+MAX_BOUNCES = 3.0
 """Bounces after which the tip stays where it is."""
-LEAST = 0.01
+MIN_CARE = 0.01
 """Least factor of the gain."""
 RECOVERY = 10.0
 """Time in which the gain recovers by a factor of e [s]."""
@@ -115,7 +115,7 @@ def next_backstop(law, b, was, stage, w, desired, before):
         swings = swings + 1.0 if last > 0.0 and peak > 0.8 * last else 0.0
         sign, peak, last = side, abs(error), peak
         if swings >= 2.0:
-            care, last, swings = max(0.5 * care, LEAST), 0.0, 0.0
+            care, last, swings = max(0.5 * care, MIN_CARE), 0.0, 0.0
     return Backstop(care=care, sign=sign, peak=peak, before=last, swings=swings, top=top, bounces=bounces)
 
 
@@ -128,5 +128,5 @@ def without_swings(care, top, bounces):
 @law
 def after_bounce(law, b):
     """A contact that was lost: the loop was beyond its gain margin pi/(2 alpha), so that the gain falls by that."""
-    care = max(b.care * 2.0 * law.alpha / pi, LEAST)
+    care = max(b.care * 2.0 * law.alpha / pi, MIN_CARE)
     return without_swings(care, 0.0, b.bounces + 1.0)
