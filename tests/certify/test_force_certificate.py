@@ -137,7 +137,7 @@ FORGERIES = [
     (("gains", "theta"), lambda v: 0.3 * v),
     (("gains", "cap"), lambda v: 0.01 * v),
     (("gains", "alpha"), 0.99),
-    (("gains", "law"), "cautious adaptive control 7"),
+    (("gains", "law"), "cautious adaptive control 6"),
     (("gains", "arm", "inner", "delay"), 0.03),
     (("gains", "arm", "inner", "stiffness"), lambda v: 0.1 * v),
     (("gains", "arm", "rate"), 100),

@@ -10,8 +10,8 @@ from palpate._vector import Mat3, Vec3
 from palpate.force.contact_estimate import AXIS_K, PRIOR, Fit, fit_through, without_offset
 from palpate.force.guard import STATE, flatten, law_in, put_state, state_in
 from palpate.force.simulated_press import pressed, surface, world_of
-from palpate.force.stage import LOCKED, PressPhase
-from palpate.force.stiffness_bound import next_bound
+from palpate.force.stage import LOCKED, Stage
+from palpate.force.stiffness_bound import Bound, next_bound
 from palpate.force.touching import touch
 
 
@@ -144,10 +144,10 @@ def evident(law, stiffness, std):
 
 def test_a_rise_on_suspicion_is_taken_back_and_one_on_evidence_stays():
     law = gains_of().cautious()
-    locked, known = PressPhase(LOCKED, 1e3, 1e3, 1e3), 0.01 * law.cap
+    locked, known = Stage(LOCKED, 1e3, 1e3, 1e3), 0.01 * law.cap
     start = law.start()
     watch, follow = start.watch, start.follow
-    held = start.bound._replace(used=known, held=known, calm=1e3)
+    held = Bound(known, known, law.cap, 0.0, 1e3, start.bound.sure)
     suspected = next_bound(law, held, locked, evident(law, 0.05, 0.01), watch, follow)  # by 3.7 deviations
     assert suspected.used > 0.05 * law.cap
     assert suspected.held == known

@@ -232,14 +232,17 @@ def test_the_approach_is_what_its_touch_bears(gains):
     assert K * flow.y[0].max() == pytest.approx(gains.force, rel=1e-3)
 
 
-def test_its_command_is_faster_than_the_approach_only_where_the_surface_is_confirmed(gains):
+def test_its_command_leads_only_where_a_test_has_borne_the_surface_out(gains):
+    """A speed above three approaches is that of a tip whose surface was sure, and then rose as was foretold."""
     rows = pressed(
         world_of(gains.arm, noise=0.1), surface(400.0), gains.cautious(), 0.003, np.full(1500, 15.0), 0
     )
-    force, speed = rows[:, 0], rows[:, 3]
-    first = int(np.argmax(speed > 1.001 * gains.approach))
+    force, speed, position = rows[:, 0], rows[:, 3], rows[:, 2]
+    first, full = (int(np.argmax(speed > n * gains.approach * 1.001)) for n in (1.0, 3.0))
     assert force[first] > 2.0 * gains.level
-    assert speed[first : first + 50].max() > 5.0 * gains.approach
+    assert full > first
+    assert force[full] - force[first] > 0.5 * 400.0 * (position[full] - position[first])
+    assert speed[full : full + 50].max() > 5.0 * gains.approach
 
 
 @pytest.mark.long

@@ -28,7 +28,8 @@ IN_FORCE_LOOP = {
     **OPERATORS,
     "variance > 0.0 ? sqrt(variance) : UNKNOWN": "rounding leaves no variance",
     "estimate->std.x == 0.0 ||": "the estimate is forgotten in free motion, so the second condition decides nothing",
-    "law->lead > 0.0 &&": "a tip that a servo moves; the recorded presses are those of a position arm",
+    "stopped": "a tip that a servo moves; the recorded presses are those of a position arm",
+    "&& estimate->value.x > 0.0": "likewise: the last condition of a servo's touch",
     "lead": "likewise",
     "state->law.stage.phase == 2.0": "there is no fourth phase",
 }

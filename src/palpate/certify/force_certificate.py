@@ -70,7 +70,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-FORM, LAW = "palpate force certificate 2", "cautious adaptive control 8"
+FORM, LAW = "palpate force certificate 2", "cautious adaptive control 7"
 BITS = 160
 ONE = 1 << BITS
 SPARE = 1 << 40

@@ -103,8 +103,7 @@ def first_estimate(law, estimate, before, stage, w, f, starts, behind):
     what comes between two readings.
     """
     sigma = sqrt(w.variance)
-    slow, fast, since, origin = estimate.slow, estimate.fast, estimate.since, estimate.origin
-    shown, value, std = estimate.shown, estimate.value, estimate.std
+    slow, fast, since, origin, shown, value, std = estimate
     if stage.phase == FREE_MOTION:
         since, origin, shown, value, std = 0.0, f.y, 0.0, ZERO3, ZERO3
     if stage.firm == 0.0:
@@ -127,9 +126,7 @@ def first_estimate(law, estimate, before, stage, w, f, starts, behind):
             std = Vec3(slow.std(AXIS_K), slow.std(AXIS_B), slow.std(BOTH))
     if before.phase == LOCKED and stage.phase == LEARNING:
         slow = without_offset(slow, 0.25)
-    return ContactEstimate(
-        slow=slow, fast=fast, since=since, origin=origin, shown=shown, value=value, std=std
-    )
+    return ContactEstimate(slow, fast, since, origin, shown, value, std)
 
 
 @law
@@ -149,25 +146,32 @@ def reading_variance(law, estimate, w, rate):
 @law
 def next_estimate(law, estimate, state, stage, w, f, force):
     """Estimate after this tick's reading."""
-    slow, fast, since, origin = estimate.slow, estimate.fast, estimate.since + 1.0, estimate.origin
-    shown, value, std = estimate.shown, estimate.value, estimate.std
-    if w.age == 0.0 and since * law.tick >= law.blind:
-        rate = (f.y - f.y0) / law.tick
-        phi, edge = (
-            regressor(law, estimate, f, rate),
-            EDGE * max(sqrt(w.variance), 2.0 * sqrt(w.slow_variance)),
+    since = estimate.since + 1.0
+    if w.age > 0.0 or since * law.tick < law.blind:
+        return ContactEstimate(
+            estimate.slow, estimate.fast, since, estimate.origin, estimate.shown, estimate.value, estimate.std
         )
-        if state.bound.used >= law.cap and std.z > 0.0 and force - value @ phi > edge:
-            slow = fit_through(phi.x, force, sqrt(w.variance))  # refuted: it begins here
-            since, shown, value, std = stage.firm, 0.0, ZERO3, ZERO3
-        else:
-            weight = 1.0 / reading_variance(law, estimate, w, rate)
-            if stage.firm * law.tick >= law.blind:
-                fast = fast.with_reading(phi, force, weight, 1.0 - law.tick / law.theta)
-            if stage.phase != LOCKED:
-                keep = 1.0 if state.bound.used >= law.cap else 1.0 - law.tick / (6.0 * law.theta)
-                slow = slow.with_reading(phi, force, weight, keep)
-                value, std = slow.solution(), Vec3(slow.std(AXIS_K), slow.std(AXIS_B), slow.std(BOTH))
-    return ContactEstimate(
-        slow=slow, fast=fast, since=since, origin=origin, shown=shown, value=value, std=std
-    )
+    rate = (f.y - f.y0) / law.tick
+    phi = regressor(law, estimate, f, rate)
+    if state.bound.sure.refuted > 0.0:  # it was no surface: what it seemed to tell is forgotten
+        nothing = fit_through(law.cap * (f.y - estimate.origin), w.mean, UNKNOWN)
+        return ContactEstimate(nothing, nothing, law.blind / law.tick, estimate.origin, 0.0, ZERO3, ZERO3)
+    if (
+        state.bound.used >= law.cap
+        and estimate.std.z > 0.0
+        and force - estimate.value @ phi > EDGE * max(sqrt(w.variance), 2.0 * sqrt(w.slow_variance))
+    ):
+        here = fit_through(phi.x, force, sqrt(w.variance))  # refuted: it begins here
+        return ContactEstimate(here, estimate.fast, stage.firm, estimate.origin, 0.0, ZERO3, ZERO3)
+    weight = 1.0 / reading_variance(law, estimate, w, rate)
+    fast = estimate.fast
+    if stage.firm * law.tick >= law.blind:
+        fast = fast.with_reading(phi, force, weight, 1.0 - law.tick / law.theta)
+    if stage.phase == LOCKED:
+        return ContactEstimate(
+            estimate.slow, fast, since, estimate.origin, estimate.shown, estimate.value, estimate.std
+        )
+    keep = 1.0 if state.bound.used >= law.cap else 1.0 - law.tick / (6.0 * law.theta)
+    slow = estimate.slow.with_reading(phi, force, weight, keep)
+    std = Vec3(slow.std(AXIS_K), slow.std(AXIS_B), slow.std(BOTH))
+    return ContactEstimate(slow, fast, since, estimate.origin, estimate.shown, slow.solution(), std)

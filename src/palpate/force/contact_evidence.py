@@ -142,7 +142,7 @@ class Steepest(NamedTuple):
 
 
 @part
-class ContactDetectorState(NamedTuple):
+class Watch(NamedTuple):
     """The force's readings and their noise."""
 
     last: float
@@ -195,10 +195,9 @@ def next_watch(law, state, starts, force):
     w = state.watch
     if state.ticks < 1.0:
         period = law.period / law.tick
-        return ContactDetectorState(
-            last=force, former=force, mean=force, slow=w.rest, slower=force, rest=w.rest, drift=w.drift, peak=w.peak,
-            variance=w.variance, slow_variance=w.slow_variance, evidence=0.0, fresh=w.fresh + 1.0, age=0.0, gap=period,
-            steepest=Steepest(total=0.0, last=force, former=force, rise=w.steepest.rise),
+        return Watch(
+            force, force, force, w.rest, force, w.rest, w.drift, w.peak, w.variance, w.slow_variance, 0.0,
+            w.fresh + 1.0, 0.0, period, Steepest(0.0, force, force, w.steepest.rise),
         )  # fmt: skip
     fresh, steepest = is_fresh(law, w, force), steepest_of(law, state, force)
     mean = w.mean + law.tick / (0.004 + law.tick) * (force - w.mean)
@@ -209,27 +208,34 @@ def next_watch(law, state, starts, force):
     many = w.fresh + 1.0 if fresh else w.fresh
     span = min(state.ticks * law.tick, 3.0)
     if fresh:
-        if state.bound.confirmed == 0.0:
+        if state.bound.sure.stiffness == 0.0:
             # A second difference: neither bias nor drift nor a touch is noise.
             bend = force - 2.0 * w.last + w.former
             variance += (min(bend * bend / 6.0, 9.0 * variance) - variance) / (FEWEST + span / law.period)
         variance = max(variance, law.least)
         former = w.last
-    slower, rest, drift, peak, slow_variance = w.slower, w.rest, w.drift, w.peak, w.slow_variance
-    if state.stage.phase == FREE_MOTION:
-        slower += law.tick / (SLOWER * law.theta + law.tick) * (force - slower)
-        swing = slow - slower
-        slow_variance += law.tick / (1.0 + span) * (min(swing * swing, 9.0 * slow_variance) - slow_variance)
-        ramp = explained_variance(starts, behind(law, state)) > 0.5 * EVIDENT * spread_of(law, w)
-        if evidence < 0.3 * CONTACT and not ramp and many > FEWEST:
-            rest += law.tick / (min(state.ticks * law.tick, MEMORY) + law.period) * (force - rest)
-            rest = max(min(rest, law.bias), -law.bias)
-        drift += law.tick / MEMORY * ((rest - w.rest) / law.tick - drift)
-        peak = min(max((1.0 - law.tick / FADING) * peak, abs(slow - rest)), law.bias)
-    return ContactDetectorState(
-        last=force, former=former, mean=mean, slow=slow, slower=slower, rest=rest, drift=drift, peak=peak,
-        variance=variance, slow_variance=max(slow_variance, white(law, variance)), evidence=evidence, fresh=many,
-        age=age, gap=gap, steepest=steepest,
+    if state.stage.phase != FREE_MOTION:
+        slow_variance = max(w.slow_variance, white(law, variance))
+        return Watch(
+            force, former, mean, slow, w.slower, w.rest, w.drift, w.peak, variance, slow_variance, evidence, many,
+            age, gap, steepest,
+        )  # fmt: skip
+    slower = w.slower + law.tick / (SLOWER * law.theta + law.tick) * (force - w.slower)
+    swing = slow - slower
+    slow_variance = w.slow_variance + law.tick / (1.0 + span) * (
+        min(swing * swing, 9.0 * w.slow_variance) - w.slow_variance
+    )
+    rest = w.rest
+    ramp = explained_variance(starts, behind(law, state)) > 0.5 * EVIDENT * spread_of(law, w)
+    if evidence < 0.3 * CONTACT and not ramp and many > FEWEST:
+        rest += law.tick / (min(state.ticks * law.tick, MEMORY) + law.period) * (force - rest)
+        rest = max(min(rest, law.bias), -law.bias)
+    slow_variance = max(slow_variance, white(law, variance))
+    drift = w.drift + law.tick / MEMORY * ((rest - w.rest) / law.tick - w.drift)
+    peak = min(max((1.0 - law.tick / FADING) * w.peak, abs(slow - rest)), law.bias)
+    return Watch(
+        force, former, mean, slow, slower, rest, drift, peak, variance, slow_variance, evidence, many, age, gap,
+        steepest,
     )  # fmt: skip
 
 
@@ -244,11 +250,11 @@ def steepest_of(law, state, force):
     fading = 1.0 - law.tick / MEMORY if state.stage.phase == FREE_MOTION else 1.0
     total, rise = s.total + force, fading * s.rise
     if state.ticks % span != 0.0:
-        return Steepest(total=total, last=s.last, former=s.former, rise=rise)
+        return Steepest(total, s.last, s.former, rise)
     mean = total / span
-    if state.bound.confirmed == 0.0:
+    if state.bound.sure.stiffness == 0.0:
         rise = max(rise, mean - s.former)
-    return Steepest(total=0.0, last=mean, former=s.last, rise=rise)
+    return Steepest(0.0, mean, s.last, rise)
 
 
 @law
@@ -262,10 +268,9 @@ def tare(law, w):
     """The bias after a false touch: the mean over theta, which is within what a sensor may be off."""
     peak = min(max(w.peak, abs(w.slow - w.rest)), law.bias)
     drift = w.drift + (w.slow - w.rest) / MEMORY
-    return ContactDetectorState(
-        last=w.last, former=w.former, mean=w.mean, slow=w.slow, slower=w.slow, rest=w.slow, drift=drift, peak=peak,
-        variance=w.variance, slow_variance=w.slow_variance, evidence=0.0, fresh=w.fresh, age=w.age, gap=w.gap,
-        steepest=w.steepest,
+    return Watch(
+        w.last, w.former, w.mean, w.slow, w.slow, w.slow, drift, peak, w.variance, w.slow_variance, 0.0, w.fresh,
+        w.age, w.gap, w.steepest,
     )  # fmt: skip
 
 

@@ -26,7 +26,7 @@ ALPHA = 0.42
 """Gain in units of 1/theta, L = alpha e^(-s theta)/(theta s): 0.42 gives a gain margin of pi/(2 alpha) = 3.7.
 Measured by benchmarks/force/first_touches.py: 0.45 overshoots by 9 % on the stiffest surfaces, 0.36 is a
 quarter slower."""
-LAW = "cautious adaptive control 8"
+LAW = "cautious adaptive control 7"
 """Name of the law in adaptive control (a gain that the estimate's uncertainty lowers), and its version.
 A certificate of another one is refused."""
 LEVEL_FRACTION = 0.0075

@@ -8,9 +8,9 @@ from palpate._jit import law, part, reader, writer
 from palpate._jit.overloads import leaves, places
 from palpate.arrays import Array
 from palpate.force.contact_estimate import ContactEstimate
-from palpate.force.contact_evidence import FREE_MOTION, MEMORY, ContactDetectorState, behind
+from palpate.force.contact_evidence import FREE_MOTION, MEMORY, Watch, behind
 from palpate.force.law import Cautious, CautiousState
-from palpate.force.stage import LEARNING, LOCKED, MAX_BOUNCES, follows_no_tip
+from palpate.force.stage import LEARNING, LOCKED, MOST, follows_no_tip
 from palpate.force.stiffness_bound import STIFFER
 
 FINE, BLIND, STALE, SATURATED, LIMITED, LATE, UNREACHED, PULLED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
@@ -65,9 +65,7 @@ class SafetyState(NamedTuple):
     trouble: float  # of the last tick
 
 
-QUIET = SafetyState(
-    silent=0.0, unchanged=0.0, way=0.0, vain=0.0, reached=0.0, touched=0.0, losses=0.0, trouble=FINE
-)  # fmt: skip
+QUIET = SafetyState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, FINE)
 
 
 @law
@@ -75,11 +73,8 @@ def safe_step(law, state, guard, desired, force, position, missed):
     """One tick, with a safe answer to everything that is no reading: speed [m/s], and both states."""
     lag = law.theta / law.tick
     if not (abs(force) <= SCALES * law.full_scale and abs(position) <= FAR):
-        g = guard
-        return 0.0, state, SafetyState(
-            silent=g.silent + 1.0, unchanged=g.unchanged, way=g.way, vain=g.vain, reached=g.reached,
-            touched=g.touched, losses=g.losses, trouble=BLIND,
-        )  # fmt: skip
+        silent, unchanged, way, vain, reached, touched, losses, _ = guard
+        return 0.0, state, SafetyState(silent + 1.0, unchanged, way, vain, reached, touched, losses, BLIND)
     gap = guard.silent > 0.0 or not missed <= 0.0
     if guard.silent > lag or not missed <= lag:  # too long to go on from what was known
         state = restart(law, state)
@@ -90,19 +85,11 @@ def safe_step(law, state, guard, desired, force, position, missed):
     vain, reached = in_vain(law, guard, after, desired, wanted)
     way = guard.way + law.tick * abs(wanted) if unchanged > 0.0 else 0.0
     touched, losses = losses_of(law, guard, after)
-    guard = SafetyState(
-        silent=0.0, unchanged=unchanged, way=way, vain=vain, reached=reached, touched=touched, losses=losses,
-        trouble=LATE if gap else FINE,
-    )  # fmt: skip
+    guard = SafetyState(0.0, unchanged, way, vain, reached, touched, losses, LATE if gap else FINE)
     speed, trouble = allowed_speed(law, guard, after, desired, force, wanted)
     if not abs(speed) <= law.speed:  # nothing that is not finite, or too fast, leaves
-        return 0.0, restart(law, state), SafetyState(
-            silent=0.0, unchanged=0.0, way=0.0, vain=0.0, reached=0.0, touched=0.0, losses=0.0, trouble=BLIND
-        )  # fmt: skip
-    return speed, after, SafetyState(
-        silent=0.0, unchanged=unchanged, way=way, vain=vain, reached=reached, touched=touched, losses=losses,
-        trouble=trouble,
-    )  # fmt: skip
+        return 0.0, restart(law, state), SafetyState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, BLIND)
+    return speed, after, SafetyState(0.0, unchanged, way, vain, reached, touched, losses, trouble)
 
 
 @part
@@ -151,13 +138,13 @@ def allowed_speed(law, guard, after, desired, force, speed):
         return 0.0, STALE
     if guard.vain > FARTHEST * desired:
         return 0.0, UNREACHED
-    if after.backstop.bounces >= MAX_BOUNCES and after.stage.phase == FREE_MOTION:
+    if after.backstop.bounces >= MOST and after.stage.phase == FREE_MOTION:
         return 0.0, BOUNCED
     if follows_no_tip(law, after) and abs(after.watch.slow) >= law.bias:
         return 0.0, UNTARED
     if after.bound.most > STIFFER * law.cap and guard.trouble == FINE:
         return speed, BEYOND
-    if guard.losses >= MAX_BOUNCES and after.stage.phase == LEARNING and guard.trouble == FINE:
+    if guard.losses >= MOST and after.stage.phase == LEARNING and guard.trouble == FINE:
         return speed, SWINGS
     drifts = MEMORY * abs(after.watch.drift) > SEEN * (after.watch.variance / behind(law, after)) ** 0.5
     return (
@@ -205,27 +192,24 @@ def in_vain(law, guard, after, desired, speed):
 def restart(law, state):
     """Free motion, of which only the sensor's noise and bias are known."""
     s, w = law.start(), state.watch
-    watch = ContactDetectorState(
-        last=0.0, former=0.0, mean=0.0, slow=w.rest, slower=w.rest, rest=w.rest, drift=w.drift, peak=w.peak,
-        variance=w.variance, slow_variance=w.slow_variance, evidence=0.0, fresh=w.fresh, age=0.0,
-        gap=law.period / law.tick, steepest=w.steepest,
+    watch = Watch(
+        0.0, 0.0, 0.0, w.rest, w.rest, w.rest, w.drift, w.peak, w.variance, w.slow_variance, 0.0, w.fresh, 0.0,
+        law.period / law.tick, w.steepest,
     )  # fmt: skip
     return CautiousState(
-        ticks=s.ticks, desired=s.desired, watch=watch, follow=s.follow, stage=s.stage, estimate=s.estimate,
-        starts=s.starts, bound=s.bound, backstop=state.backstop, pace=s.pace, recall=s.recall,
+        s.ticks, s.desired, watch, s.follow, s.stage, s.estimate, s.starts, s.bound, state.backstop, s.pace,
+        s.recall,
     )  # fmt: skip
 
 
 @law
 def after_gap(state):
     """The low-pass has to forget the gap before anything is learned."""
-    s, k = state, state.estimate
-    estimate = ContactEstimate(
-        slow=k.slow, fast=k.fast, since=0.0, origin=k.origin, shown=k.shown, value=k.value, std=k.std
-    )
+    k = state.estimate
+    estimate = ContactEstimate(k.slow, k.fast, 0.0, k.origin, k.shown, k.value, k.std)
     return CautiousState(
-        ticks=s.ticks, desired=s.desired, watch=s.watch, follow=s.follow, stage=s.stage, estimate=estimate,
-        starts=s.starts, bound=s.bound, backstop=s.backstop, pace=s.pace, recall=s.recall,
+        state.ticks, state.desired, state.watch, state.follow, state.stage, estimate, state.starts, state.bound,
+        state.backstop, state.pace, state.recall,
     )  # fmt: skip
 
 

@@ -17,9 +17,9 @@ from palpate.force.contact_estimate import NOTHING, ContactEstimate, Fit, first_
 from palpate.force.contact_evidence import (
     FREE_MOTION,
     NO_STARTS,
-    ContactDetectorState,
     Starts,
     Steepest,
+    Watch,
     behind,
     next_starts,
     next_watch,
@@ -27,17 +27,8 @@ from palpate.force.contact_evidence import (
     white,
 )
 from palpate.force.outlier import REFUTED, Knowledge, Recall, next_recall
-from palpate.force.stage import (
-    MAX_BOUNCES,
-    STEP,
-    Backstop,
-    PressPhase,
-    is_false_touch,
-    next_backstop,
-    next_stage,
-    without_swings,
-)
-from palpate.force.stiffness_bound import Bound, next_bound
+from palpate.force.stage import MOST, STEP, Backstop, Stage, is_false_touch, next_backstop, next_stage
+from palpate.force.stiffness_bound import EARNED, Bound, Sure, next_bound
 
 SMOOTHING = 0.1
 """Of a servo's lag in free motion, by which its lead is smoothed: the usual filter of a PID controller's derivative,
@@ -112,24 +103,20 @@ class Cautious(NamedTuple):
     def start(self):
         """Free motion, with no estimate of a surface."""
         fit, variance = Fit(NOTHING, ZERO3), max(self.noise * self.noise, self.least)
-        slow_variance, steepest = white(self, variance), Steepest(total=0.0, last=0.0, former=0.0, rise=0.0)
-        watch = ContactDetectorState(
-            last=0.0, former=0.0, mean=0.0, slow=0.0, slower=0.0, rest=0.0, drift=0.0, peak=0.0, variance=variance,
-            slow_variance=slow_variance, evidence=0.0, fresh=0.0, age=0.0, gap=0.0, steepest=steepest,
-        )  # fmt: skip
-        stage = PressPhase(phase=FREE_MOTION, since=0.0, quiet=0.0, firm=0.0)
-        estimate = ContactEstimate(
-            slow=fit, fast=fit, since=0.0, origin=0.0, shown=0.0, value=ZERO3, std=ZERO3
+        slow_variance, steepest = white(self, variance), Steepest(0.0, 0.0, 0.0, 0.0)
+        watch = Watch(
+            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, variance, slow_variance, 0.0, 0.0, 0.0, 0.0, steepest
         )
-        bound = Bound(
-            used=self.cap, held=self.cap, most=self.cap, least=0.0, calm=0.0, confirmed=0.0, trail=0.0, stroke=0.0
-        )  # fmt: skip
-        backstop = without_swings(1.0, 0.0, 0.0)
-        known = Knowledge(watch=watch, stage=stage, estimate=estimate, bound=bound, backstop=backstop)
+        stage, estimate = (
+            Stage(FREE_MOTION, 0.0, 0.0, 0.0),
+            ContactEstimate(fit, fit, 0.0, 0.0, 0.0, ZERO3, ZERO3),
+        )
+        bound = Bound(self.cap, self.cap, self.cap, 0.0, 0.0, Sure(0.0, 0.0, 0.0, self.approach, 0.0, 0.0))
+        backstop = Backstop(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        recall = Recall(0.0, Knowledge(watch, stage, estimate, bound, backstop))
+        follow = Follow(ZERO3, 0.0, 0.0, 0.0, 0.0)
         return CautiousState(
-            ticks=0.0, desired=0.0, watch=watch, follow=at_origin(0.0), stage=stage,
-            estimate=estimate, starts=NO_STARTS, bound=bound, backstop=backstop, pace=self.approach,
-            recall=Recall(readings=0.0, known=known),
+            0.0, 0.0, watch, follow, stage, estimate, NO_STARTS, bound, backstop, self.approach, recall
         )  # fmt: skip
 
     def step(self, state, desired, force, position):
@@ -155,14 +142,14 @@ class Cautious(NamedTuple):
         forward = 0.0
         if stage.phase != FREE_MOTION and abs(desired - before) <= STEP * abs(desired):
             forward = (desired - before) / self.tick * (self.compliance + 1.0 / bound.used)
-        limit = self.speed if bound.confirmed > 0.0 else self.approach
+        limit = bound.sure.limit
         speed = max(min(u + forward, limit), -limit)
         if stage.phase == FREE_MOTION:
-            speed = backstop.care * self.approach if backstop.bounces < MAX_BOUNCES else 0.0
-        speed, pace = lead_speed(self, state.pace, speed, bound.used, limit)
+            speed = backstop.care * self.approach if backstop.bounces < MOST else 0.0
+        most = self.speed if limit > EARNED * self.approach else limit
+        speed, pace = lead_speed(self, state.pace, speed, bound.used, most)
         return speed, CautiousState(
-            ticks=state.ticks + 1.0, desired=desired, watch=watch, follow=follow, stage=stage, estimate=estimate,
-            starts=starts, bound=bound, backstop=backstop, pace=pace, recall=recall,
+            state.ticks + 1.0, desired, watch, follow, stage, estimate, starts, bound, backstop, pace, recall
         )  # fmt: skip
 
     def stiffness_bound(self, state):
@@ -185,9 +172,9 @@ class Follow(NamedTuple):
 class CautiousState(NamedTuple):
     ticks: float
     desired: float
-    watch: ContactDetectorState
+    watch: Watch
     follow: Follow
-    stage: PressPhase
+    stage: Stage
     estimate: ContactEstimate
     starts: Starts
     bound: Bound
@@ -199,11 +186,10 @@ class CautiousState(NamedTuple):
 @law
 def without_outliers(state):
     """The state as it would be without the readings that were refuted."""
-    s, known = state, state.recall.known
+    watch, stage, estimate, bound, backstop = state.recall.known
     return CautiousState(
-        ticks=s.ticks, desired=s.desired, watch=known.watch, follow=s.follow, stage=known.stage,
-        estimate=known.estimate, starts=s.starts, bound=known.bound, backstop=known.backstop, pace=s.pace,
-        recall=s.recall,
+        state.ticks, state.desired, watch, state.follow, stage, estimate, state.starts, bound, backstop, state.pace,
+        state.recall,
     )  # fmt: skip
 
 
@@ -213,7 +199,9 @@ def lead_speed(law, pace, speed, bound, limit):
 
     A tip that a servo pulls against a surface of stiffness K is late by the slowest time constant of
     m s^2 + D s + K_s + K. The command is ahead by that. What the limit takes off is taken off the smoothed speed, so
-    that it stays the speed that the tip can have.
+    that it stays the speed that the tip can have. The speed that a test has borne out is the tip's: the command is
+    then ahead of it by up to the arm's own limit. Before, a tip that gathers speed slowly touches gently where a sensor
+    lied: measured by benchmarks/force/free_motion.py.
     """
     if law.lead == 0.0:
         return speed, speed
@@ -238,13 +226,7 @@ def next_follow(law, state, position):
     """This tick's position as the sensor saw it."""
     f = state.follow
     if state.ticks < 1.0:
-        return at_origin(position)
+        return Follow(ZERO3, 0.0, 0.0, 0.0, position)
     x = position - f.origin
     z = law.E @ f.z + f.x * law.e0 + x * law.e1
-    return Follow(z=z, x=x, y=law.c @ z + law.d * x, y0=f.y, origin=f.origin)
-
-
-@law
-def at_origin(position):
-    """The first position, which is the origin of all that follow."""
-    return Follow(z=ZERO3, x=0.0, y=0.0, y0=0.0, origin=position)
+    return Follow(z, x, law.c @ z + law.d * x, f.y, f.origin)

@@ -12,8 +12,8 @@ from typing import NamedTuple
 from palpate._jit import law, part
 from palpate._vector import solve
 from palpate.force.contact_estimate import ContactEstimate, reading_variance, regressor
-from palpate.force.contact_evidence import EVIDENT, ContactDetectorState, is_fresh
-from palpate.force.stage import LOCKED, Backstop, PressPhase
+from palpate.force.contact_evidence import EVIDENT, Watch, is_fresh
+from palpate.force.stage import LOCKED, Backstop, Stage
 from palpate.force.stiffness_bound import Bound
 
 CHANGE = 3.0
@@ -27,8 +27,8 @@ REFUTED = -1.0
 class Knowledge(NamedTuple):
     """State of the law that its readings have taught it."""
 
-    watch: ContactDetectorState
-    stage: PressPhase
+    watch: Watch
+    stage: Stage
     estimate: ContactEstimate
     bound: Bound
     backstop: Backstop
@@ -64,10 +64,10 @@ def next_recall(law, state, follow, force):
     """
     readings, known = state.recall
     if readings <= 0.0:
-        readings = 0.0
-        known = Knowledge(
-            watch=state.watch, stage=state.stage, estimate=state.estimate, bound=state.bound, backstop=state.backstop
-        )  # fmt: skip
+        readings, known = (
+            0.0,
+            Knowledge(state.watch, state.stage, state.estimate, state.bound, state.backstop),
+        )
     if state.stage.phase != LOCKED:
         return Recall(0.0, known)
     if is_fresh(law, state.watch, force):

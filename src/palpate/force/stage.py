@@ -17,7 +17,7 @@ STEP = 0.02
 
 
 @part
-class PressPhase(NamedTuple):
+class Stage(NamedTuple):
     """Phase of a press, and how long it has lasted."""
 
     phase: float
@@ -32,21 +32,18 @@ def next_stage(law, state, w, desired, before, false_touch):
     stage, felt = state.stage, w.mean - w.rest
     since = stage.since + 1.0
     firm = stage.firm + 1.0 if felt > sqrt(w.variance) else 0.0
+    if stage.phase == FREE_MOTION:
+        return (
+            Stage(LEARNING, 0.0, 0.0, firm) if w.evidence >= CONTACT else Stage(FREE_MOTION, since, 0.0, firm)
+        )
+    if w.evidence <= 0.0 or false_touch:
+        return Stage(FREE_MOTION, 0.0, 0.0, 0.0)
+    if stage.phase == LOCKED and abs(desired - before) > 0.2 * abs(before):
+        return Stage(LEARNING, 0.0, 0.0, firm)
     quiet = stage.quiet + 1.0 if abs(desired - felt) < 0.07 * abs(desired) else 0.0
-    phase = stage.phase
-    if phase == FREE_MOTION:
-        phase = LEARNING if w.evidence >= CONTACT else FREE_MOTION
-    elif w.evidence <= 0.0 or false_touch:
-        phase, firm = FREE_MOTION, 0.0
-    elif phase == LOCKED and abs(desired - before) > 0.2 * abs(before):
-        phase = LEARNING
-    elif phase == LEARNING and quiet * law.tick > 3.0 * law.theta:
-        phase = LOCKED
-    if phase != stage.phase:
-        since = 0.0
-    if phase != stage.phase or phase == FREE_MOTION:
-        quiet = 0.0
-    return PressPhase(phase=phase, since=since, quiet=quiet, firm=firm)
+    if stage.phase == LEARNING and quiet * law.tick > 3.0 * law.theta:
+        return Stage(LOCKED, 0.0, 0.0, firm)
+    return Stage(stage.phase, since, quiet, firm)
 
 
 @law
@@ -59,14 +56,14 @@ def is_false_touch(law, state, w):
 def follows_no_tip(law, state):
     """Whether the force of a touch neither rises nor falls with the tip by as much as the softest surface's would."""
     estimate = state.estimate
-    if estimate.std.x == 0.0 or state.stage.phase == FREE_MOTION or state.bound.confirmed > 0.0:
+    if estimate.std.x == 0.0 or state.stage.phase == FREE_MOTION or state.bound.sure.stiffness > 0.0:
         return False
     return (abs(estimate.value.x) + PLAIN * estimate.std.x) * law.cap * law.approach < law.drift
 
 
-MAX_BOUNCES = 3.0
+MOST = 3.0
 """Bounces after which the tip stays where it is."""
-MIN_CARE = 0.01
+LEAST = 0.01
 """Least factor of the gain."""
 RECOVERY = 10.0
 """Time in which the gain recovers by a factor of e [s]."""
@@ -102,31 +99,23 @@ def next_backstop(law, b, was, stage, w, desired, before):
     if stage.phase == FREE_MOTION:
         if was.phase not in (FREE_MOTION, LOCKED) and b.top > law.bias:
             return after_bounce(law, b)
-        return without_swings(care, 0.0, b.bounces)
+        return Backstop(care, 0.0, 0.0, 0.0, 0.0, 0.0, b.bounces)
     top, bounces = max(b.top, felt), 0.0 if stage.phase == LOCKED else b.bounces
     error, level = desired - felt, max(0.07 * abs(desired), 4.0 * sqrt(w.variance))
     if abs(desired - before) > STEP * abs(desired):
-        return without_swings(care, top, bounces)
-    sign, peak, last, swings = b.sign, b.peak, b.before, b.swings
+        return Backstop(care, 0.0, 0.0, 0.0, 0.0, top, bounces)
     side = 1.0 if error > level else -1.0 if error < -level else 0.0
-    if side == sign:
-        peak = max(peak, abs(error))
-    elif side != 0.0:
-        swings = swings + 1.0 if last > 0.0 and peak > 0.8 * last else 0.0
-        sign, peak, last = side, abs(error), peak
-        if swings >= 2.0:
-            care, last, swings = max(0.5 * care, MIN_CARE), 0.0, 0.0
-    return Backstop(care=care, sign=sign, peak=peak, before=last, swings=swings, top=top, bounces=bounces)
-
-
-@law
-def without_swings(care, top, bounces):
-    """The backstop as it is before any swing of the error."""
-    return Backstop(care=care, sign=0.0, peak=0.0, before=0.0, swings=0.0, top=top, bounces=bounces)
+    if side in (0.0, b.sign):
+        peak = max(b.peak, abs(error)) if side == b.sign else b.peak
+        return Backstop(care, b.sign, peak, b.before, b.swings, top, bounces)
+    swings = b.swings + 1.0 if b.before > 0.0 and b.peak > 0.8 * b.before else 0.0
+    if swings >= 2.0:
+        return Backstop(max(0.5 * care, LEAST), side, abs(error), 0.0, 0.0, top, bounces)
+    return Backstop(care, side, abs(error), b.peak, swings, top, bounces)
 
 
 @law
 def after_bounce(law, b):
     """A contact that was lost: the loop was beyond its gain margin pi/(2 alpha), so that the gain falls by that."""
-    care = max(b.care * 2.0 * law.alpha / pi, MIN_CARE)
-    return without_swings(care, 0.0, b.bounces + 1.0)
+    care = max(b.care * 2.0 * law.alpha / pi, LEAST)
+    return Backstop(care, 0.0, 0.0, 0.0, 0.0, 0.0, b.bounces + 1.0)

@@ -12,6 +12,12 @@ SHOWED = 3.0
 """Times the largest deviation that free motion has shown, and the largest rise within half of theta, that a surface has
 to exceed: three steps of a cable never do.
 Measured by benchmarks/force/free_motion.py: with 2.5 slow hums and coloured noise pass three times as often."""
+EARNED = 3.0
+"""Times as fast as before the tip may be where the readings bear the stiffness out: twice as fast costs a tenth of a
+second on the softest surfaces, four times as fast lets a sensor that lies once come to twice the peak.
+Measured by benchmarks/force/free_motion.py."""
+BORNE = 2.0
+"""Standard deviations by which a rise that is foretold has to stand out of the noise to count as a test."""
 STOPPED = 0.75
 """Of the approach: a servo's tip that was faster, and is slower than this, is held back by a surface, stiffer than a
 third of the servo.
@@ -35,6 +41,18 @@ before the bound is held."""
 
 
 @part
+class Sure(NamedTuple):
+    """The force as surely that of a surface."""
+
+    stiffness: float  # with which it became so, in caps; 0 while the force may be the sensor's alone
+    x: float  # position at the last test of it; until it is sure, a servo's of theta/2 ago, smoothed [m]
+    force: float  # mean force there [N]
+    limit: float  # of the speed [m/s]
+    refuted: float  # 1 in the tick in which it became unsure again
+    way: float  # of a servo's tip in theta/2, at the end of free motion [m]
+
+
+@part
 class Bound(NamedTuple):
     """Upper bound K_u of the stiffness."""
 
@@ -43,9 +61,7 @@ class Bound(NamedTuple):
     most: float  # the cap, or what has refuted it [N/m]
     least: float  # half of what was held, until there is free motion: a surface that recedes looks soft [N/m]
     calm: float  # ticks since the last suspicion
-    confirmed: float  # 1 where the force is surely a surface's, 0 while it may be the sensor's alone
-    trail: float  # position of theta/2 ago, smoothed, until then [m]
-    stroke: float  # of the tip in theta/2, at the end of free motion [m]
+    sure: Sure
 
 
 @law
@@ -55,58 +71,78 @@ def next_bound(law, bound, stage, estimate, w, f):
     Locked, it rises at once where the last theta alone is by `z` standard deviations for a stiffer surface. Noise is so
     too, now and then: the rise is taken back unless the readings bear it out, so that it adds up to nothing.
     """
-    used, held, most, least = bound.used, bound.held, bound.most, bound.least
-    calm, confirmed, trail, stroke = bound.calm, bound.confirmed, bound.trail, bound.stroke
-    if confirmed == 0.0:
-        trail += 2.0 * law.tick / law.theta * (f.y - trail)
     if stage.phase == FREE_MOTION:
-        used, held, least, calm, confirmed, stroke = most, most, 0.0, 0.0, 0.0, f.y - trail
-    elif estimate.since * law.tick >= law.blind and stage.since * law.tick >= SURE * law.period:
-        p, alone, both = estimate.fast.solution(), estimate.fast.std(AXIS_K), estimate.fast.std(BOTH)
-        most = max(most, (1.0 + law.eps) * highest(law, p, -SHOWN * alone, -SHOWN * both))
-        upper = min((1.0 + law.eps) * highest(law, p, law.z * alone, law.z * both), most)
-        if stage.phase == LOCKED:
-            if highest(law, p, -SHOWN * alone, -SHOWN * both) > STIFFER * held:
-                held = upper
-            suspected = highest(law, p, -law.z * alone, -law.z * both)
-            calm = 0.0 if suspected > STIFFER * held else calm + 1.0
-            used = used if calm * law.tick < AGAIN * law.theta else held
-            used = upper if suspected > STIFFER * used else max(used, held)
-            least = 0.5 * held
-        else:
-            used = most
-            if confirmed > 0.0 or is_surface(law, estimate, w, f.y - trail, stroke):
-                confirmed = 1.0
-                used = max(from_slow(law, estimate, most), least)
-                used = upper if highest(law, p, -alone, -both) > used else used
-            held, calm = used, 0.0
+        x = trail(law, bound.sure, f)
+        return Bound(
+            bound.most, bound.most, bound.most, 0.0, 0.0, Sure(0.0, x, 0.0, law.approach, 0.0, f.y - x)
+        )
+    if bound.sure.stiffness == 0.0:
+        unsure = Sure(
+            0.0, trail(law, bound.sure, f), 0.0, bound.sure.limit, bound.sure.refuted, bound.sure.way
+        )
+        bound = Bound(bound.used, bound.held, bound.most, bound.least, bound.calm, unsure)
+    if estimate.since * law.tick < law.blind or stage.since * law.tick < SURE * law.period:
+        return bound
+    p, alone, both = estimate.fast.solution(), estimate.fast.std(AXIS_K), estimate.fast.std(BOTH)
+    most = max(bound.most, (1.0 + law.eps) * highest(law, p, -SHOWN * alone, -SHOWN * both))
+    upper = min((1.0 + law.eps) * highest(law, p, law.z * alone, law.z * both), most)
+    if stage.phase != LOCKED:
+        sure = borne_out(law, bound.sure, estimate, w, f)
+        if sure.stiffness == 0.0:
+            return Bound(most, most, most, bound.least, 0.0, sure)
+        now = max(from_slow(law, estimate, most), bound.least)
+        now = upper if highest(law, p, -alone, -both) > now else now
+        return Bound(now, now, most, bound.least, 0.0, sure)
+    held = bound.held
+    if highest(law, p, -SHOWN * alone, -SHOWN * both) > STIFFER * held:
+        held = upper
+    suspected = highest(law, p, -law.z * alone, -law.z * both)
+    calm = 0.0 if suspected > STIFFER * held else bound.calm + 1.0
+    used = bound.used if calm * law.tick < AGAIN * law.theta else held
     return Bound(
-        used=used, held=held, most=most, least=least, calm=calm, confirmed=confirmed, trail=trail, stroke=stroke
-    )  # fmt: skip
+        upper if suspected > STIFFER * used else max(used, held), held, most, 0.5 * held, calm, bound.sure
+    )
 
 
 @law
-def is_surface(law, estimate, w, moved, stroke):
-    """Whether the force is surely that of a surface, from which on the tip may be faster than its approach.
+def borne_out(law, sure, estimate, w, f):
+    """Whether the force is surely that of a surface, and how fast the tip may be.
 
-    The force is above the level, and above `SHOWED` times what free motion and any half of theta have shown, and it
-    follows the tip. Of a servo's tip it is enough that it is held back.
-
-    Args:
-        law: the law's numbers.
-        estimate: of the surface.
-        w: readings.
-        moved: way of the tip in the last theta/2 [m].
-        stroke: the same at the end of free motion [m].
+    It becomes so above the level, and above `SHOWED` times what free motion and any half of theta have shown, where the
+    force follows the tip. From there on each part of the way is a test: the force has to rise by half of what the
+    stiffness foretells, where that stands out of the noise. If it does, the speed may be `EARNED` times as high; if
+    not, nothing is sure.
     """
-    level = max(law.level, EDGE * sqrt(w.variance))
-    if w.fresh <= FEWEST or w.mean - w.rest <= level:
-        return False
+    sigma = sqrt(w.variance)
+    if sure.stiffness > 0.0:
+        noise = max(BORNE * 0.7 * sigma, w.peak)
+        expected, rise = 0.5 * sure.stiffness * law.cap * (f.y - sure.x), w.mean - sure.force
+        if rise < expected - noise:
+            return Sure(0.0, f.y, 0.0, law.approach, 1.0, 0.0)
+        if expected > noise or sure.limit >= law.speed:
+            return Sure(sure.stiffness, f.y, w.mean, min(EARNED * sure.limit, law.speed), 0.0, 0.0)
+        return sure
+    level = max(law.level, EDGE * sigma, SHOWED * w.steepest.rise)
     slow = STOPPED * 0.5 * law.theta * law.approach
-    if law.lead > 0.0 and moved < slow < stroke:
-        return True
-    shown = w.mean - w.rest > SHOWED * w.steepest.rise and w.slow - w.rest > SHOWED * w.peak
-    return shown and (estimate.value.x - EDGE * estimate.std.x) * law.cap * law.approach > law.drift
+    stopped = law.lead > 0.0 and f.y - sure.x < slow < sure.way
+    if (
+        stopped
+        and w.fresh > FEWEST
+        and w.mean - w.rest > max(law.level, EDGE * sigma)
+        and estimate.value.x > 0.0
+    ):
+        return Sure(estimate.value.x, f.y, w.mean, min(EARNED * law.approach, law.speed), 0.0, 0.0)
+    follows = (estimate.value.x - EDGE * estimate.std.x) * law.cap * law.approach > law.drift
+    shown = w.mean - w.rest > level and w.slow - w.rest > SHOWED * w.peak
+    if w.fresh > FEWEST and shown and follows:
+        return Sure(estimate.value.x, f.y, w.mean, min(EARNED * law.approach, law.speed), 0.0, 0.0)
+    return Sure(0.0, sure.x, 0.0, law.approach, 0.0, sure.way)
+
+
+@law
+def trail(law, sure, f):
+    """Position of theta/2 ago, smoothed, as long as nothing is sure; where the tip is when that begins [m]."""
+    return f.y if sure.stiffness > 0.0 else sure.x + 2.0 * law.tick / law.theta * (f.y - sure.x)
 
 
 @law

@@ -61,8 +61,8 @@ REMEDIES = {
     "unaryop": "use - of numbers and not of truths",
     "boolop": "join truths; write a if b else c for another value",
     "ifexp": "give both values one type",
-    "call": "call a law, or abs, max, sqrt, or palpate's log, with all its arguments in order (a part's fields also by "
-    "name); and alone in a statement if it writes to an array",
+    "call": "call a law, or abs, max, sqrt, or palpate's log, with all its arguments in order; and alone in a "
+    "statement if it writes to an array",
     "for": "count with range by 1 or by -1, with a name that nothing else has",
     "assign": "assign one type, as 0.0 for 0, to a name or an array's element, and arrays of a size in numbers",
     "other": "use numbers, parts, arrays, operators and laws",
@@ -289,15 +289,15 @@ class Expressions:
         return Value(f"{test.at(OR)} ? {a.at(OR)} : {b.at(CHOICE)}", a.type, CHOICE)
 
     def _call(self, node: ast.Call) -> Value:
+        self.need(not node.keywords, node)
         callee = self.python_object(node.func)
-        self.need(not node.keywords or callee in parts, node)
         part = []
         is_method = callee is None and isinstance(node.func, ast.Attribute)
         if is_method:
             part = [self.expression(node.func.value)]  # type: ignore[attr-defined]
             callee = _method(part[0], node.func)  # type: ignore[arg-type]
             self.need(inspect.isfunction(callee), node)
-        values = [*part, *map(self.expression, arguments(node, callee))]
+        values = [*part, *map(self.expression, node.args)]
         if callee in stored:
             of, reads = stored[callee]
             kind = plain(kind_of(of))
@@ -355,12 +355,6 @@ class Expressions:
             return Value(f"{call})", kind)
         new = f"&({self.whole.structs.name(kind)}){{0}}"
         return Value(f"*{call}, {new})", kind, UNARY, call=f"{call}, ")
-
-
-def arguments(node: ast.Call, callee: Any) -> list[ast.expr]:
-    """Arguments of a call in the order of its parameters: keywords are fields of the part `callee`."""
-    fields = {keyword.arg: keyword.value for keyword in node.keywords}
-    return [*node.args, *(fields[name] for name in getattr(callee, "_fields", ()) if name in fields)]
 
 
 def _method(part: Value, node: ast.Attribute) -> Any:

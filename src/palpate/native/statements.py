@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from palpate._jit.cache import parts
-from palpate.native.expressions import SUM, UNARY, Expressions, Value, arguments
+from palpate.native.expressions import SUM, UNARY, Expressions, Value
 from palpate.native.normal_form import normal_form
 from palpate.native.source import parse_function, statement_comments
 from palpate.native.structs import by_pointer, c_name, is_struct, leaves, members
@@ -144,7 +144,7 @@ class FunctionBody(Expressions):
         if isinstance(node, ast.Name) and by_pointer(place.type):
             yield node.id, place
         callee = self.function.__globals__.get(getattr(getattr(node, "func", None), "id", ""))
-        fields = arguments(node, callee) if callee in parts else getattr(node, "elts", [])
+        fields = getattr(node, "args" if callee in parts else "elts", [])
         for inner, field in zip(fields, members(place.type) if fields else [], strict=False):
             yield from self._places(inner, place.member(*field))
 

@@ -223,7 +223,7 @@ def press_tick(law, s, late, desired, force, position, missed):
     stiffness, sd = stiffness_in(c, press)
     over = press.watch.mean - press.watch.rest - desired
     # a touch is where its force is F_d: that place is known once K adds less to its error than the noise does
-    known = s[TOUCHES] < ALL and press.bound.confirmed > 0.0 and abs(over) * sd < c.noise * stiffness
+    known = s[TOUCHES] < ALL and press.bound.sure.stiffness > 0.0 and abs(over) * sd < c.noise * stiffness
     if (known or press.stage.phase == LOCKED) and size > 0.5 * desired and guard.trouble == FINE:
         if s[TOUCHES] < ALL:
             put_vector(s, PACE, ZERO3)
