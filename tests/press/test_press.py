@@ -183,8 +183,15 @@ def test_a_users_own_gains(tmp_path):
     path.write_text(pressing.request.gains.to_toml())
     again = prepare_press(question(force=15.0, gains=path))
     assert again.request.gains == pressing.request.gains
-    with pytest.raises(InputError, match="for a torque arm, and --mode says position"):
-        prepare_press(question(force=15.0, gains=path, mode="position"))
+    others = [
+        ({"mode": "position"}, "for a torque arm, and --mode says position"),
+        ({"arm": "iiwa14"}, "for the Franka Research 3, and --arm says iiwa14"),
+        ({"surface": surface_of("K=2e6,B=0")}, "the gains are for at most 1e[+]06 N/m"),
+        ({"force_max": 60.0}, "the gains are for F_max = 75 N"),
+    ]
+    for changes, reason in others:
+        with pytest.raises(InputError, match=reason):
+            prepare_press(question(**{"force": 15.0, "gains": path, **changes}))
 
 
 WRONG = [

@@ -247,6 +247,11 @@ def test_gains_of_another_rate_are_refused(folder, here, capsys, tmp_path):
         assert "100 readings a second, and the gains are for 50" in refused(capsys, *words, "--dry-run")
 
 
+def test_gains_of_another_highest_force_are_refused(folder, here, capsys):
+    words = [*words_of(folder, "sim:127.0.0.1:9"), "--dry-run", "--force-max", "60:N"]
+    assert "--force-max is 60 N, and the gains are for" in refused(capsys, *words)
+
+
 def test_an_untared_sensor_is_refused(folder, here, capsys):
     with simulated_arm(folder, bias=(1.0, 0.0, 90.0)) as network:
         assert "tare it" in refused(capsys, *words_of(folder, network.address), "--dry-run")

@@ -196,6 +196,18 @@ def check_mode(gains: Gains, mode: str | None) -> str:
     return gains.arm.kind
 
 
+def check_arm(gains: Gains, name: str) -> None:
+    """Refuse gains for another of the arms that come with palpate; the title of any other arm says nothing.
+
+    Raises:
+        InputError: it names both arms.
+    """
+    models = {known: load_arm(known).title.partition(",")[0] for known in names()}
+    model = gains.arm.title.partition(",")[0]
+    if model in models.values() and model != models.get(name, model):
+        raise InputError(f"these gains are for the {model}, and --arm says {name}; tune for that arm")
+
+
 def mass_note(gains: Gains, mass: float | None = None) -> str | None:
     """Note with its remedy if gains assume that a position arm's tip has no mass; None otherwise.
 

@@ -15,7 +15,16 @@ from palpate.force.ceiling import check_same_force_max, usual_force_max
 from palpate.force.force_loop import ForceLoop
 from palpate.force.gains import Gains, load_gains
 from palpate.press.at_rest import SURE, check_drift, check_range, fitting, noise_and_drift
-from palpate.press.engines import ENGINES, MODES, check_mode, loop_of, mass_note, press_gains, usual_mode
+from palpate.press.engines import (
+    ENGINES,
+    MODES,
+    check_arm,
+    check_mode,
+    loop_of,
+    mass_note,
+    press_gains,
+    usual_mode,
+)
 from palpate.press.free_stroke import StrokePlan, make_stroke
 from palpate.press.pressing import Progress, press
 from palpate.press.sequence import CautiousDriver, Plan, PressDriver, plan_for
@@ -295,6 +304,7 @@ def _check_words(spec: PressSpec) -> None:
 def _gains(spec: PressSpec, arm: SerialArm, place: Place) -> Gains:
     if spec.gains is not None:
         gains = load_gains(spec.gains)
+        check_arm(gains, spec.arm)
         check_mode(gains, spec.mode)
         _check_sensor(spec, gains.arm.sensor, gains.force_limit)
         check_same_force_max(gains.force_max, spec.force_max)
