@@ -74,7 +74,7 @@ def test_the_first_line_of_the_page_is_the_answer(slid, tmp_path) -> None:
             ["--gains", "gains.toml", "--mu-max", "0.5"],
             "--mu-max is set by gains.toml",
         ),
-        (["--gains", "gains.toml", "--arm", "fr3"], "--arm is of the gains"),
+        (["--gains", "gains.toml", "--arm", "fr3"], "--arm is set by gains.toml"),
         (["--gains", "gains.toml", "--path", "line", "--length", "20:mm"], "ends after 0.67 s"),
         (["--gains", "gains.toml", "--surface", "K=2e4,K=5"], "each once"),
         (["--gains", "gains.toml", "--surface", "K=2e4,B=20"], "--surface needs the numbers K and mu"),

@@ -146,7 +146,7 @@ def _tuned(identified: Path | None, parameters: GivenOptions, law: LawOptions) -
 
     if parameters.arm is None or law.force is None:
         raise InputError(
-            "a law in C needs gains for an arm and a force; add --arm and --force, as --force 15:N"
+            "a law in C is of gains for an arm and a force; add --arm and --force, as --force 15:N"
         )
     if parameters.stiffness is None:
         assert identified is not None

@@ -136,8 +136,8 @@ def map(  # noqa: A001 - the command's name
         raise InputError("palpate map needs logs or a folder of them, or --table with places and stiffnesses")
     if places.table is not None and (places.each_contact or any((source, frame, arm, fitted))):
         raise InputError(
-            "--table takes places and stiffnesses as they are; leave out --each-contact and the options of logs, "
-            "frames, arms and models"
+            "--each-contact and the options of logs, frames, arms and models are of logs; a table's places and "
+            "stiffnesses stand as they are: leave these options out"
         )
     from palpate.maps.result import map_of
 
@@ -155,10 +155,10 @@ def _presses(logs: Sequence[Path], places: PlaceOptions, log_options: OneLog) ->
 
     if places.table is not None:
         if places.place is not None:
-            raise InputError("--place belongs to logs; name the columns of a table with --columns")
+            raise InputError("--place is of logs; the columns of a table are given with --columns")
         return read_table(places.table, places.columns.split(",") if places.columns else ())
     if places.columns is not None:
-        raise InputError("--columns belongs to --table; name the place in logs with --place")
+        raise InputError("--columns is of --table; the place in logs is given with --place")
     from palpate.logs.formats import gather_logs
 
     with bar(console(stderr=True)) as progress:

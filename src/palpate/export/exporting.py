@@ -44,11 +44,11 @@ class Request:
                 " --geom"
             )
         if self.target == "mjcf-spring" and (self.model or self.probe):
-            raise InputError("--to mjcf-spring takes no scene; leave out --model and --probe")
+            raise InputError("--model and --probe are of a scene; --to mjcf-spring takes none")
         if self.target == "drake" and self.model is not None and self.surface is None:
             raise InputError("name the collision that is the surface with --geom")
         if self.target == "drake" and self.model is None and self.probe is not None:
-            raise InputError("--probe is part of a scene; name the scene with --model")
+            raise InputError("--probe is of a scene; name it with --model")
 
     @property
     def name(self) -> str:

@@ -109,7 +109,7 @@ def palpate_phantom(
     """
     if count < FIRST * FIRST:
         raise InputError(
-            f"a map of a phantom begins with {FIRST * FIRST} presses; give at least as many, got {count}"
+            f"a map of a phantom begins with {FIRST * FIRST} presses; ask for as many, got {count}"
         )
     presser = prepare_press(replace(spec, surface=KelvinVoigt(phantom.stiffness, phantom.damping, 0.0)))
     steps = [(np.arange(FIRST) / (FIRST - 1.0)) * side for side in phantom.size]

@@ -197,7 +197,7 @@ def _load(spec: PressSpec, arm: SerialArm) -> SerialArm:
         return arm
     if spec.physics == "mujoco" and arm.scene is not None:
         raise InputError(
-            f"{spec.arm} is a model of MuJoCo, to which --payload adds no tool; give the tool a body there, or"
+            f"{spec.arm} is MuJoCo's own model, in which --payload hangs nothing; give the tool a body there, or"
             " leave --physics out"
         )
     return with_tool(arm, spec.payload)

@@ -215,9 +215,7 @@ def _check_metrics(study: Study) -> None:
         metric_of(name)
     for name in shown:
         if name not in study.metrics:
-            raise InputError(
-                f"{name!r} is in [maps], [curves] or [best], and not among the metrics; add it there"
-            )
+            raise InputError(f"{name!r} is drawn or ranked by, and is not among the metrics; add it there")
 
 
 def _check_parameter(name: str, parameter: StudyParameter) -> None:
