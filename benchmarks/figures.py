@@ -56,7 +56,7 @@ class Figure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         sources: files and folders that decide its numbers, from the project's root. The script is one, too. None: the
             figure is of a day, and no digest tells when it is of the past.
         fenced: whether it is text with columns, rather than Markdown.
-        times: whether it holds times, which no second run prints again.
+        times: whether it holds times, or what rounding decides, which no other machine prints again.
         needs: programs, and files from the project's root, without which the small run is left out, and the figure not
             made.
     """
