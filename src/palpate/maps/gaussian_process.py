@@ -139,9 +139,9 @@ class Conditioned:
 
     def leave_one_out(self) -> tuple[Array, Array]:
         """Deviation of each value from the prediction of the others, and its variance, (n,) each (section 5.4.2)."""
-        inverse = _product(self.whitening.T, self.whitening)
-        w = inverse.sum(axis=0)
-        inverse -= np.outer(w, w) / w.sum()
+        ones = self.whitening.sum(axis=1)
+        w = self.whitening.T @ ones
+        inverse = _product(self.whitening.T, self.whitening) - np.outer(w, w) / (ones @ ones)
         variance = 1.0 / np.diag(inverse)
         return (inverse @ self.values) * variance, variance
 
@@ -257,8 +257,10 @@ def loss(
     K[np.diag_indices_from(K)] = p.variance + noise**2 + p.repeat**2 + p.shared**2
     W = whiten(K)
     P = _product(W.T, W)
-    w = P.sum(axis=0)
-    P -= np.outer(w, w) / w.sum()
+    ones = W.sum(axis=1)
+    total = ones @ ones  # as a sum of squares, which rounding does not make negative
+    w = W.T @ ones
+    P -= np.outer(w, w) / total
     a = np.einsum("ij,j", P, values)
     G = P - np.outer(a, a)  # G / 2 is the derivative by the covariance, which holds each pair twice
     pairs = squareform(G, checks=False)
@@ -266,7 +268,7 @@ def loss(
     gradient.insert(4, 0.0)  # the repetition adds no covariance between different values
     variances = np.array([p.smooth**2, 0.0, p.rough**2, 0.0, p.repeat**2, p.shared**2])
     diagonal = np.trace(G) * variances
-    value = 0.5 * values @ a - np.log(np.diag(W)).sum() + 0.5 * np.log(w.sum())
+    value = 0.5 * values @ a - np.log(np.diag(W)).sum() + 0.5 * np.log(total)
     return float(value), np.array(gradient) + diagonal[: len(gradient)]
 
 
