@@ -252,9 +252,8 @@ def _free_before_touch(means: _MovingMeans) -> Mask:
     position = means.position
     later = met + max(round(0.5 / means.step), means.window)
     contact_force = means.rotations[met] @ (np.median(means.force[met:later], axis=0) - level)
-    approach = (
-        position[end] - position[end - means.window]
-    )  # before that, the tip may come across from another touch
+    # Before its last part, the tip may come across from another touch.
+    approach = position[end] - position[end - means.window]
     departure = position[min(met + brief, len(position) - 1)] - position[met]
     slide = position[min(later, len(position) - 1)] - position[met]
     across = contact_force - slide * (contact_force @ slide) / max(slide @ slide, 1e-300)

@@ -139,9 +139,7 @@ class Conditioned:
 
     def leave_one_out(self) -> tuple[Array, Array]:
         """Deviation of each value from the prediction of the others, and its variance, (n,) each (section 5.4.2)."""
-        ones = self.whitening.sum(axis=1)
-        w = self.whitening.T @ ones
-        inverse = _product(self.whitening.T, self.whitening) - np.outer(w, w) / (ones @ ones)
+        inverse, _ = _without_level(self.whitening)
         variance = 1.0 / np.diag(inverse)
         return (inverse @ self.values) * variance, variance
 
@@ -183,6 +181,18 @@ def _product(rows: Array, right: Array) -> Array:
     """The product of two matrices by parts of the left one's rows, each so small that BLAS starts no threads."""
     height = max(PRODUCT // max(right.size, 1), 1)
     return np.concatenate([rows[first : first + height] @ right for first in range(0, len(rows), height)])
+
+
+def _without_level(W: Array) -> tuple[Array, float]:
+    """Inverse of a covariance (n, n) without the unknown level of the values, and the precision of that level.
+
+    Args:
+        W: `whiten` of the covariance (n, n).
+    """
+    ones = W.sum(axis=1)
+    precision = float(ones @ ones)  # a sum of squares, which rounding does not make negative
+    w = W.T @ ones
+    return _product(W.T, W) - np.outer(w, w) / precision, precision
 
 
 def whiten(covariance: Array) -> Array:
@@ -256,11 +266,7 @@ def loss(
     K = squareform(covariance)
     K[np.diag_indices_from(K)] = p.variance + noise**2 + p.repeat**2 + p.shared**2
     W = whiten(K)
-    P = _product(W.T, W)
-    ones = W.sum(axis=1)
-    total = ones @ ones  # as a sum of squares, which rounding does not make negative
-    w = W.T @ ones
-    P -= np.outer(w, w) / total
+    P, precision = _without_level(W)
     a = np.einsum("ij,j", P, values)
     G = P - np.outer(a, a)  # G / 2 is the derivative by the covariance, which holds each pair twice
     pairs = squareform(G, checks=False)
@@ -268,7 +274,7 @@ def loss(
     gradient.insert(4, 0.0)  # the repetition adds no covariance between different values
     variances = np.array([p.smooth**2, 0.0, p.rough**2, 0.0, p.repeat**2, p.shared**2])
     diagonal = np.trace(G) * variances
-    value = 0.5 * values @ a - np.log(np.diag(W)).sum() + 0.5 * np.log(total)
+    value = 0.5 * values @ a - np.log(np.diag(W)).sum() + 0.5 * np.log(precision)
     return float(value), np.array(gradient) + diagonal[: len(gradient)]
 
 
