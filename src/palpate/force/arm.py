@@ -228,6 +228,10 @@ class Arm(Table):
 
 
 def _ticks(ticks: float) -> int:
+    if not math.isfinite(ticks):
+        raise InputError(
+            "a delay of the arm is more ticks than can be counted; check its delays and its rate"
+        )
     return math.ceil(ticks - 1e-9)
 
 
